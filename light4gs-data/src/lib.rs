@@ -13,6 +13,8 @@
 //! | try things out without a dataset | [`write_synthetic`]: a small moving scene |
 //! | decode images within a memory bound | [`ImageStore`] |
 //! | take metrics over parts of an image | [`regions`] |
+//! | see what a dataset is taken for | [`CaptureSummary`] |
+//! | find cameras of a rig that are out of step | [`change_curves`], [`out_of_step`] |
 //! | notice that a dataset has changed | [`DatasetDigest`] |
 //! | make a camera, or a path of cameras | [`Camera::look_at`], [`orbit_path`] |
 //! | undo the distortion of a lens | nothing: [`ImageStore`] does it; [`Lens`] is the model |
@@ -66,6 +68,7 @@ mod frame;
 mod images;
 mod layouts;
 mod lens;
+mod numbered;
 mod options;
 mod orbit;
 pub mod ply;
@@ -75,6 +78,8 @@ mod programs;
 mod pytorch;
 mod regular_file;
 mod scene;
+mod summary;
+mod synchrony;
 mod synthetic;
 
 pub use atomic::{is_temporary_name, process_id, sweep_leftovers, write_atomically};
@@ -90,12 +95,15 @@ pub use images::{
 };
 pub use layouts::{Colmap, DNerf, DatasetLayout, HyperNerf, Layouts, NerfDs, Nerfstudio, Neu3d};
 pub use lens::{Distortion, Lens};
-pub use options::{LoadOptions, Resolution};
+pub use numbered::NumberedFiles;
+pub use options::{CamerasFrom, LoadOptions, Resolution, TimesFrom};
 pub use orbit::orbit_path;
 pub use ply::GaussianPly;
 pub use points::{PointCloud, SH_C0, SMALLEST_MEAN_SQUARED_DISTANCE, mean_squared_distance_to_3_nearest};
 pub use prepare::{PrepareEvent, PrepareOptions, PrepareSummary, prepare};
 pub use pytorch::{PlainTensor, read_pytorch};
 pub use regular_file::{open_regular_file, read_regular_file, read_regular_text};
-pub use scene::{Scene, Split, SplitFrames};
+pub use scene::{Reading, Scene, Split, SplitFrames};
+pub use summary::{CaptureFact, CaptureSummary};
+pub use synchrony::{ChangeCurve, OutOfStep, change_curves, out_of_step};
 pub use synthetic::{SyntheticOptions, write_synthetic};

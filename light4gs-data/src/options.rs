@@ -40,6 +40,30 @@ impl Resolution {
     }
 }
 
+/// How the times of images follow from their names, where the capture's files do not give times.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum TimesFrom {
+    /// From a date and time of day in the names, otherwise from their last number, otherwise from their order.
+    #[default]
+    Auto,
+    /// From the last number.
+    Number,
+    /// From the natural order of the names of each camera: one step a name.
+    Order,
+}
+
+/// How the cameras of images follow from their names, in layouts that do not name cameras.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum CamerasFrom {
+    /// From the folder and the name without what counts the time.
+    #[default]
+    Auto,
+    /// There is one camera, which moves.
+    One,
+    /// Each folder is a camera.
+    Folder,
+}
+
 /// How to open a scene.
 #[derive(Clone, Debug, PartialEq)]
 pub struct LoadOptions {
@@ -58,10 +82,19 @@ pub struct LoadOptions {
     pub random_points: usize,
     /// Half the side of the cube of the random points, world units.
     pub random_half_size: f32,
+    /// The most points that a cloud keeps; of a larger one every n-th point is left.
+    pub most_points: usize,
+    /// How times follow from the images' names.
+    pub times: TimesFrom,
+    /// How cameras follow from the images' names.
+    pub cameras: CamerasFrom,
+    /// Whether cameras of a rig that are out of step are moved in time, see [`crate::out_of_step`]. Up to 240 images are
+    /// decoded for it.
+    pub synchronize: bool,
 }
 
 impl Default for LoadOptions {
-    /// Layout by content, native size, white background, 2000 random points in ±1.3, seed 0.
+    /// Layout by content, native size, white background, 2000 random points in ±1.3, at most a million points, seed 0.
     fn default() -> Self {
         Self {
             layout: None,
@@ -71,6 +104,10 @@ impl Default for LoadOptions {
             seed: 0,
             random_points: 2000,
             random_half_size: 1.3,
+            most_points: 1_000_000,
+            times: TimesFrom::default(),
+            cameras: CamerasFrom::default(),
+            synchronize: false,
         }
     }
 }
@@ -94,6 +131,9 @@ impl LoadOptions {
         }
         if self.frames == Some(0) {
             return bad("frames", "0, expected at least 1".into());
+        }
+        if self.most_points == 0 {
+            return bad("most_points", "0, expected at least 1".into());
         }
         if self.random_points == 0 || self.random_points > 100_000_000 {
             let found = self.random_points;

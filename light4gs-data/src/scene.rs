@@ -97,10 +97,24 @@ pub struct Scene {
     pub extent: f32,
     /// Notes for the user about reading the folder, such as images without a pose, or frames that were left out.
     pub notes: Vec<String>,
+    /// How cameras and times were read.
+    pub reading: Reading,
+}
+
+/// In words: where cameras and times of a scene come from.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct Reading {
+    /// Such as `one moving camera`. Empty: as the layout has them.
+    pub cameras: String,
+    /// Such as `the last number in the images' names`. Empty: as the layout has them.
+    pub times: String,
 }
 
 /// Far more than any capture has: 20 cameras for half an hour.
 const MAX_FRAMES: usize = 1_000_000;
+
+/// A cloud with fewer points than this says little about where the scene is.
+const FEW_POINTS: usize = 10;
 
 impl Scene {
     /// A scene from frames and points that a [`crate::DatasetLayout`] has read in the folder `root`.
@@ -118,6 +132,10 @@ impl Scene {
         points: PointCloud,
         background: [f32; 3],
     ) -> Result<Self, DataError> {
+        if frames.train.len() + frames.test.len() == 1 {
+            let problem = "1 image found, expected at least 2: one to learn from and one to measure";
+            return Err(DataError::field(root, "images", problem, "add images from other places or times"));
+        }
         let counts = [("train", frames.train.len()), ("test", frames.test.len()), ("points", points.len())];
         if let Some((what, _)) = counts.into_iter().find(|(_, count)| *count == 0) {
             return Err(DataError::field(root, what, "0 found, expected at least one", "complete the dataset"));
@@ -146,7 +164,44 @@ impl Scene {
             camera_mean,
             extent,
             notes: Vec::new(),
+            reading: Reading::default(),
         })
+    }
+
+    /// The same scene with notes of its reader, before those that it has.
+    #[must_use]
+    pub fn with_notes(mut self, notes: Vec<String>) -> Self {
+        self.notes.splice(0..0, notes);
+        self
+    }
+
+    /// The same scene, with the sources of its cameras and times.
+    #[must_use]
+    pub fn with_reading(mut self, reading: Reading) -> Self {
+        self.reading = reading;
+        self
+    }
+
+    /// The same scene without points that cannot be meant, and with at most `most` points, with a note about those that
+    /// are left out. Points alone in a scene are left as they are.
+    pub(crate) fn with_usable_points(mut self, most: usize) -> Self {
+        let far = self.points.leave_out_far(&self.train);
+        if far > 0 {
+            self.notes.push(format!(
+                "{far} of the {} points lie more than 100 times as far away as the others and the cameras, and are left out",
+                far + self.points.len()
+            ));
+        }
+        let given = self.points.len();
+        if self.points.thin(most) > 0 {
+            self.notes.push(format!("of the {given} points, {} are kept, evenly chosen", self.points.len()));
+        }
+        if self.points.len() < FEW_POINTS {
+            let count = self.points.len();
+            self.notes
+                .push(format!("training starts from {count} points only; without a cloud it starts from random ones"));
+        }
+        self
     }
 
     /// The frames of a split.
@@ -178,12 +233,17 @@ fn make_names_unique(frames: &mut [Frame]) {
     }
     let mut taken: HashSet<String> =
         uses.iter().filter(|(_, count)| **count == 1).map(|(name, _)| name.clone()).collect();
+    // Up to which number each name is taken, so that a thousand frames of one image do not count to a thousand each.
+    let mut numbers: HashMap<String, usize> = HashMap::new();
     for frame in frames.iter_mut().filter(|frame| uses[&folded(&frame.name)] > 1) {
         let folder = frame.path.parent().and_then(Path::file_name).map(|name| name.to_string_lossy().into_owned());
         let base = folder.map_or_else(|| frame.name.clone(), |folder| format!("{folder}_{}", frame.name));
-        let numbered = (2..).map(|count| format!("{base}_{count}"));
-        let name = std::iter::once(base.clone()).chain(numbered).find(|name| taken.insert(folded(name)));
-        frame.name = name.unwrap_or(base);
+        let number = numbers.entry(folded(&base)).or_insert(1);
+        frame.name = base.clone();
+        while !taken.insert(folded(&frame.name)) {
+            *number += 1;
+            frame.name = format!("{base}_{number}");
+        }
     }
 }
 
@@ -232,7 +292,8 @@ mod tests {
             let camera = Camera::look_at(Vec3::new(x, 0.0, 0.0), Vec3::Y, Vec3::Z, 0.7, 8, 8);
             Frame::without_image(format!("{x}"), camera, 0.0)
         };
-        let frames = SplitFrames { train: vec![frame(1.0), frame(3.0)], test: vec![frame(9.0)], ..Default::default() };
+        let (train, test) = (vec![frame(1.0), frame(3.0)], vec![frame(9.0), frame(8.0)]);
+        let frames = SplitFrames { train, test, ..Default::default() };
         let points = PointCloud::random(3, 1.0, 0);
         let new = |frames, points| Scene::new("mine", Path::new("a/b"), frames, points, [1.0; 3]);
         let scene = new(frames.clone(), points.clone()).unwrap();

@@ -82,6 +82,7 @@ impl ImageSource for MemoryImages {
 
 /// The options with which a dataset is opened for a configuration.
 pub fn load_options(config: &Config) -> LoadOptions {
+    let other = LoadOptions::default();
     LoadOptions {
         layout: config.data.layout.clone(),
         frames: config.data.frames,
@@ -90,6 +91,11 @@ pub fn load_options(config: &Config) -> LoadOptions {
         seed: config.seed,
         random_points: config.data.initial_points,
         random_half_size: config.data.initial_box,
+        // A cloud that is larger than what training may grow to would only be pruned again.
+        most_points: config.train.densify.chosen().max_gaussians().unwrap_or(other.most_points),
+        times: config.data.times.into(),
+        cameras: config.data.cameras.into(),
+        synchronize: config.data.synchronize,
     }
 }
 

@@ -10,6 +10,7 @@
 //! | measure a finished run, and write its report | [`evaluate_run`] |
 //! | write a report from results at hand | [`write_report`] with a [`Report`]; parts that are empty are left out |
 //! | write another page in the same style | [`page_of`] |
+//! | show what a capture is taken for, before it is trained | [`capture_page`] |
 //! | embed an image in HTML | [`data_uri`], with [`escape`] for texts and [`inferno`] for maps |
 //! | give the player the cameras of a dataset | [`cameras_json`] |
 //!
@@ -27,6 +28,7 @@
 //! ```
 
 mod cameras;
+mod capture;
 mod chart;
 mod coding;
 mod color_map;
@@ -42,13 +44,14 @@ use std::fmt::Write as _;
 use std::io::Write as _;
 use std::path::Path;
 
-use light4gs_data::{DataError, write_atomically};
+use light4gs_data::{CaptureSummary, DataError, write_atomically};
 use light4gs_train::compression::{BitMap, CodingRecord};
 use light4gs_train::evaluation::{RenderedView, SectionSize, SplitScore};
 use light4gs_train::observers::metrics_log::MetricsRecord;
 use light4gs_web::page::{Content, PLAYER, Place, element};
 
 pub use cameras::cameras_json;
+pub use capture::capture_page;
 pub use color_map::inferno;
 pub use html::escape;
 use html::fill;
@@ -70,6 +73,10 @@ pub struct Report {
     pub device: String,
     /// The figures at the top.
     pub summary: Vec<SummaryTile>,
+    /// What to do about a run that came out badly.
+    pub advice: Vec<String>,
+    /// What the dataset was taken for.
+    pub capture: CaptureSummary,
     /// Bytes of the file by section, in the order of the file.
     pub sections: Vec<SectionSize>,
     /// The file itself, to be played at the top of the page.
@@ -125,11 +132,14 @@ pub fn write_report(path: &Path, report: &Report) -> Result<(), DataError> {
 }
 
 fn page(path: &Path, report: &Report) -> Result<String, DataError> {
+    let advice: String = report.advice.iter().map(|advice| format!("<p>{}</p>\n", escape(advice))).collect();
     let sections = [
+        section("advice", "Advice", advice),
         section("views", "Ground truth, render, error", images::section(path, &report.images)?),
         section("quality", "Quality", quality::section(&report.splits)),
         section("size", "Bytes of the file", sizes::section(&report.sections)),
         section("coding", "Entropy coding", coding::section(path, report.coding.as_ref())?),
+        section("capture", "The capture", capture::section(&report.capture)),
         section("curves", "Training", curves::section(&report.metrics)),
         section("configuration", "Configuration", configuration(&report.config_toml)),
     ];

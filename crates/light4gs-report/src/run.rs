@@ -1,8 +1,8 @@
 //! The report of a finished run: its file is measured, and the page written.
 
-use std::fs;
+use std::io::ErrorKind;
 
-use light4gs_data::{DataError, Region, Scene};
+use light4gs_data::{CaptureSummary, DataError, Region, Scene, read_regular_file};
 use light4gs_model::DeformationField;
 use light4gs_train::compression::BitMap;
 use light4gs_train::config::Config;
@@ -20,7 +20,7 @@ const REPORT_VIEWS: usize = 6;
 /// Number of cameras of each split in the player of a report.
 const PLAYER_CAMERAS: usize = 60;
 /// Size in bytes of the largest file that a report plays.
-const LARGEST_PLAYED_FILE: usize = 16 << 20;
+const LARGEST_PLAYED_FILE: u64 = 16 << 20;
 
 /// Measures the run's file on its own dataset and writes everything that depends on it: `eval.json` and the renders, as
 /// [`measure_run`] does, then `report.html`.
@@ -38,6 +38,8 @@ pub fn evaluate_run<F: DeformationField>(
         created: utc::now_to_the_minute(),
         device: evaluation.device.clone(),
         summary: summary(&evaluation),
+        advice: evaluation.advice.clone(),
+        capture: CaptureSummary::of(scene)?,
         sections: evaluation.sections.clone(),
         player: player(folder, scene)?,
         coding: match &evaluation.coding {
@@ -69,9 +71,11 @@ pub fn evaluate_run<F: DeformationField>(
 /// The file for the report, unless it would make the page too large to send.
 fn player(folder: &RunFolder, scene: &Scene) -> Result<Option<PlayerReport>, TrainError> {
     let path = folder.stream();
-    let bytes = fs::read(&path).map_err(|source| DataError::Io { action: "read", path, source })?;
-    let small = bytes.len() <= LARGEST_PLAYED_FILE;
-    Ok(small.then(|| PlayerReport { scene: bytes, cameras: cameras_json(scene, PLAYER_CAMERAS) }))
+    match read_regular_file(&path, LARGEST_PLAYED_FILE) {
+        Ok(bytes) => Ok(Some(PlayerReport { scene: bytes, cameras: cameras_json(scene, PLAYER_CAMERAS) })),
+        Err(error) if error.kind() == ErrorKind::FileTooLarge => Ok(None),
+        Err(error) => Err(DataError::io("read", &path)(error).into()),
+    }
 }
 
 fn summary(evaluation: &Evaluation) -> Vec<SummaryTile> {

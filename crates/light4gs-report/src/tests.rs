@@ -1,4 +1,6 @@
-use light4gs_data::{RgbImage8, Split};
+use light4gs_data::{
+    CaptureFact, CaptureSummary, ChangeCurve, LoadOptions, RgbImage8, Scene, Split, SyntheticOptions, write_synthetic,
+};
 use light4gs_train::Stage;
 use light4gs_train::compression::{AttributeRecord, BitEstimate, PlaneRecord};
 use light4gs_train::config::FileProfile;
@@ -38,6 +40,12 @@ fn sample() -> Report {
         created: "today".into(),
         device: "ndarray".into(),
         summary: vec![SummaryTile { label: "Test PSNR".into(), value: "31.0 dB".into(), hint: "20 views".into() }],
+        advice: vec!["train <longer>".into()],
+        capture: CaptureSummary {
+            facts: vec![CaptureFact { what: "times".into(), found: "9 from 0 to 1".into() }],
+            notes: vec!["1 of 9 images is <missing>".into()],
+            problems: Vec::new(),
+        },
         sections: vec![
             SectionSize { name: "gaussians".into(), bytes: 123_456 },
             SectionSize { name: "planes".into(), bytes: 1_234_567 },
@@ -170,4 +178,28 @@ fn the_color_map_runs_from_dark_to_bright() {
     assert_eq!(color_map::inferno(7.0), [252, 255, 164]);
     assert_eq!(color_map::inferno(f32::NAN), [0, 0, 4]);
     assert!(brightness(0.2) < brightness(0.5) && brightness(0.5) < brightness(0.9));
+}
+
+#[test]
+fn a_capture_is_shown_before_it_is_trained() {
+    let folder = tempfile::tempdir().unwrap();
+    let root = folder.path().join("<scene>");
+    let small = SyntheticOptions { resolution: 16, train_frames: 4, test_frames: 2, ..Default::default() };
+    write_synthetic(&root, &small).unwrap();
+    let scene = Scene::open(&root, &LoadOptions::default()).unwrap();
+    let curve = |i: u32| ChangeCurve {
+        camera_id: i,
+        name: format!("cam{i}"),
+        times: vec![0.5, 1.0],
+        changes: vec![0.01, 0.02],
+    };
+    let curves: Vec<ChangeCurve> = (0..5).map(curve).collect();
+    let capture = CaptureSummary::of(&scene).unwrap();
+    let html = capture_page(&scene, &capture, &curves, &[("r & 0".into(), image(16, 16, 0))]).unwrap();
+    assert_balanced(&html);
+    for expected in ["4 to train on, 2 to test", "&lt;scene&gt;", "r &amp; 0", "cameras to train on", "cam4"] {
+        assert!(html.contains(expected), "no {expected}");
+    }
+    // Two charts of up to three curves.
+    assert_eq!(html.matches("class=\"chart\"").count(), 2);
 }

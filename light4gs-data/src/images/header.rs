@@ -24,6 +24,8 @@ pub(crate) struct ImageHeader {
     pub(crate) format: ImageFormat,
     /// Width and height of the stored pixels, before any EXIF rotation.
     pub(crate) size: (u32, u32),
+    /// The rotation that turns the image upright, from its EXIF data; none without EXIF data.
+    pub(crate) orientation: Orientation,
 }
 
 /// Opens an image file and finds its format. Regular files only: opening a pipe would wait for ever.
@@ -42,8 +44,17 @@ pub(crate) fn read_header(path: &Path) -> Result<ImageHeader, DataError> {
     let bad = |what: String| DataError::image(path, what, "restore the file or remove its frame");
     let unreadable =
         |what: String| bad(format!("its header cannot be read ({what}), expected a PNG, JPEG or GIF image"));
-    let format = reader.format().ok_or_else(|| unreadable("the format is not known".into()))?;
-    let size = reader.into_dimensions().map_err(|e| unreadable(e.to_string()))?;
+    let format = match reader.format() {
+        Some(format @ (ImageFormat::Png | ImageFormat::Jpeg | ImageFormat::Gif)) => format,
+        Some(other) => {
+            let problem = format!("it is a {other:?} file, whatever its name says; expected a PNG, JPEG or GIF image");
+            return Err(DataError::image(path, problem, "convert it, for example with `ffmpeg -i IN OUT.png`"));
+        }
+        None => return Err(unreadable("the format is not known".into())),
+    };
+    let mut decoder = reader.into_decoder().map_err(|e| unreadable(e.to_string()))?;
+    let size = decoder.dimensions();
+    let orientation = decoder.orientation().unwrap_or(Orientation::NoTransforms);
     let pixels = u64::from(size.0) * u64::from(size.1);
     let most = if format == ImageFormat::Png { MAX_PNG_PIXELS } else { MAX_PIXELS };
     if pixels == 0 || size.0.max(size.1) > MAX_SIDE || pixels > most {
@@ -59,7 +70,7 @@ pub(crate) fn read_header(path: &Path) -> Result<ImageHeader, DataError> {
     if !has_end(path, format).map_err(DataError::io("read", path))? {
         return Err(bad("the end of the file is missing: it is truncated".into()));
     }
-    Ok(ImageHeader { format, size })
+    Ok(ImageHeader { format, size, orientation })
 }
 
 /// The headers of many images, read in parallel, in their order.

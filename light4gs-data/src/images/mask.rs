@@ -39,20 +39,36 @@ pub(super) fn kept_pixels(frame: &Frame, mask: &Mask) -> Result<PixelMask, DataE
     Ok(at_camera(frame, marks.into_iter().map(|value| u8::from(value != 0)).collect()))
 }
 
+/// Whether a frame's mask leaves no pixel to train on. What a mask says about motion hides nothing.
+pub(crate) fn masked_out(frame: &Frame) -> Result<bool, DataError> {
+    match frame.mask.as_ref().filter(|mask| mask.zero == MaskMeaning::Ignored) {
+        None => Ok(false),
+        Some(mask) => Ok(!kept_pixels(frame, mask)?.pixels.contains(&1)),
+    }
+}
+
 /// The mask's values at the size of the image's file, each from the nearest pixel.
 pub(super) fn read(mask: &Mask, size: (u32, u32)) -> Result<Vec<u8>, DataError> {
     let found = super::image_size(&mask.path)?;
     let gray = decode_upright(&mask.path, found)?.into_luma8();
-    same_aspect(&mask.path, found, size)?;
+    check_shape(&mask.path, found, size)?;
     Ok(nearest(gray.as_raw(), found, size))
 }
 
-fn same_aspect(path: &Path, found: (u32, u32), size: (u32, u32)) -> Result<(), DataError> {
-    if (found.0 > found.1) != (size.0 > size.1) && found.0 != found.1 && size.0 != size.1 {
+/// Refuses a mask of `found` pixels for an image of `size` pixels (width, height) where it is no smaller or larger version.
+pub(crate) fn check_shape(path: &Path, found: (u32, u32), size: (u32, u32)) -> Result<(), DataError> {
+    if !same_shape(found, size) {
         let problem = format!("the mask is {} x {} pixels, its image {} x {}", found.0, found.1, size.0, size.1);
         return Err(DataError::image(path, problem, "make masks of the images as they are"));
     }
     Ok(())
+}
+
+/// Whether one size (width, height) is a scaled version of the other, with sides rounded up or down.
+pub(crate) fn same_shape(a: (u32, u32), b: (u32, u32)) -> bool {
+    let (scale_x, scale_y) = (f64::from(a.0) / f64::from(b.0), f64::from(a.1) / f64::from(b.1));
+    let rounding = |x: u32, y: u32| 1.0 / f64::from(x.min(y).max(1));
+    (scale_x / scale_y).ln().abs() <= rounding(a.0, b.0) + rounding(a.1, b.1)
 }
 
 /// From marks at the size of the image's file to marks of the frame's camera.

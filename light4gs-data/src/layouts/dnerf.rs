@@ -1,25 +1,27 @@
 //! The D-NeRF layout: Blender transforms with a time for each frame.
 //!
-//! `transforms_{train,test,val}.json` hold `camera_angle_x` (radians) and `frames`, each with
-//! `file_path` (with or without extension), `time` and `transform_matrix` (camera to world, OpenGL
-//! axes). The first time of train and test becomes 0, the last one 1; a `val` time outside counts as the nearer one. `val`
-//! may be absent. A `points3d.ply` or `fused.ply` beside the transforms gives the points, otherwise
-//! they are random. `mask/` may have masks of what moves, for measuring: that of the image `test/r_003.png` is
-//! `mask/test/r_003.png`, of the same size, 0 where nothing moves; a split has one for each of its images, or none.
+//! `transforms_{train,test,val}.json` hold `frames`, each with `file_path` (with or without extension), `time`,
+//! `transform_matrix`, and intrinsics: `camera_angle_x` (radians), or any that [`Transforms`] knows. The first time of
+//! train and test becomes 0, the last one 1; a `val` time outside counts as the nearer one. `val` may be absent. A
+//! `points3d.ply` or `fused.ply` beside the transforms gives the points, otherwise they are random. `mask/` may have masks
+//! of what moves, for measuring: that of the image `test/r_003.png` is `mask/test/r_003.png`, of the same size, 0 where
+//! nothing moves; a split has one for each of its images, or none.
 
 use super::layout::DatasetLayout;
+use super::shared::posed::{self, PosedImage};
 use super::shared::times::TimeRange;
-use super::shared::{files, json, posed};
-use crate::camera::{Camera, PoseError};
+use super::shared::transforms::Transforms;
+use super::shared::{files, json};
+use crate::camera::Camera;
 use crate::error::DataError;
 use crate::frame::{Frame, Mask, MaskMeaning};
 use crate::images::read_headers;
 use crate::options::LoadOptions;
 use crate::orbit::orbit_path;
 use crate::points::PointCloud;
-use crate::scene::{Scene, SplitFrames};
+use crate::scene::{Reading, Scene, SplitFrames};
 use rayon::prelude::*;
-use serde_json::Value;
+use std::collections::HashSet;
 use std::path::{Path, PathBuf};
 
 /// Frames, distance to the origin (world units) and elevation (degrees) of the video path.
@@ -44,17 +46,20 @@ impl DatasetLayout for DNerf {
 
     fn open(&self, root: &Path, options: &LoadOptions) -> Result<Scene, DataError> {
         let file = |split: &str| root.join(format!("transforms_{split}.json"));
-        let train = read_split(root, file("train"))?;
-        let test = read_split(root, file("test"))?;
-        let val = if file("val").is_file() { Some(read_split(root, file("val"))?) } else { None };
+        let mut notes = Vec::new();
+        let train = Split::read(root, file("train"), &mut notes)?;
+        let test = Split::read(root, file("test"), &mut notes)?;
+        let val = if file("val").is_file() { Some(Split::read(root, file("val"), &mut notes)?) } else { None };
         let times: Vec<f64> = train.frames.iter().chain(&test.frames).map(|frame| frame.time).collect();
-        let range = TimeRange::of(&train.path, "frames[].time", &times)?;
-        let frames = |split: &RawSplit| frames(root, split, range, options);
+        let range = TimeRange::of(&train.file.path, "frames[].time", &times)?;
+        let mut frames = |split: &Split| split.frames(range, options, &mut notes);
         let (train, test) = (frames(&train)?, frames(&test)?);
         let val = val.map_or(Ok(Vec::new()), |val| frames(&val))?;
         let video = video_path(&train[0].camera);
         let splits = SplitFrames { train, test, val, video };
-        Scene::new(self.name(), root, splits, points(root, options)?, options.background)
+        let reading = Reading { times: format!("frames[].time, {range} mapped to 0 to 1"), ..Reading::default() };
+        let scene = Scene::new(self.name(), root, splits, points(root, options)?, options.background)?;
+        Ok(scene.with_notes(notes).with_reading(reading))
     }
 }
 
@@ -63,20 +68,6 @@ fn video_path(intrinsics: &Camera) -> Vec<Frame> {
     let (count, radius, elevation) = VIDEO_PATH;
     let cameras = orbit_path(count, radius, elevation, intrinsics).into_iter().enumerate();
     cameras.map(|(i, (camera, time))| Frame::without_image(format!("v_{i:03}"), camera, time)).collect()
-}
-
-/// One entry of `frames`, with the time as in the file.
-struct RawFrame {
-    pose: [[f32; 4]; 4],
-    time: f64,
-    image: PathBuf,
-}
-
-/// One transforms file.
-struct RawSplit {
-    path: PathBuf,
-    fov_x: f32,
-    frames: Vec<RawFrame>,
 }
 
 /// The point cloud of the folder, or a random one.
@@ -88,94 +79,138 @@ fn points(root: &Path, options: &LoadOptions) -> Result<PointCloud, DataError> {
     }
 }
 
-fn read_split(root: &Path, path: PathBuf) -> Result<RawSplit, DataError> {
-    let document = json::read(&path)?;
-    let fov_x = json::finite(
-        &path,
-        "camera_angle_x",
-        document.get("camera_angle_x"),
-        "the horizontal field of view in radians, between 0 and pi",
-        "add the field to the file",
-    )?;
-    if !(fov_x > 0.0 && fov_x < std::f64::consts::PI) {
-        return Err(DataError::field(
-            &path,
-            "camera_angle_x",
-            format!("{fov_x}, expected the horizontal field of view in radians, between 0 and pi"),
-            "convert degrees to radians, or export the file again",
-        ));
-    }
-    let entries =
-        document.get("frames").and_then(Value::as_array).filter(|entries| !entries.is_empty()).ok_or_else(|| {
-            let found = json::describe(document.get("frames"));
-            DataError::field(
-                &path,
-                "frames",
-                format!("{found}, expected a list of at least one frame"),
-                "every split needs a frame; only transforms_val.json may be left out altogether",
-            )
-        })?;
-    let frames =
-        entries.iter().enumerate().map(|(i, entry)| read_frame(root, &path, i, entry)).collect::<Result<_, _>>()?;
-    Ok(RawSplit { path, fov_x: fov_x as f32, frames })
+/// One entry of `frames`.
+struct RawFrame {
+    /// Its place in `frames`.
+    index: usize,
+    /// As in the file.
+    time: f64,
+    image: PathBuf,
 }
 
-fn read_frame(root: &Path, path: &Path, i: usize, entry: &Value) -> Result<RawFrame, DataError> {
+/// One transforms file.
+struct Split {
+    file: Transforms,
+    frames: Vec<RawFrame>,
+}
+
+impl Split {
+    fn read(root: &Path, path: PathBuf, notes: &mut Vec<String>) -> Result<Self, DataError> {
+        let file = Transforms::read(root, path)?;
+        let mut frames = Vec::with_capacity(file.frames.len());
+        let mut known = HashSet::new();
+        for index in 0..file.frames.len() {
+            let (time, image) = (read_time(&file, index)?, find_image(&file, index)?);
+            if known.insert((image.clone(), time.to_bits())) {
+                frames.push(RawFrame { index, time, image });
+            }
+        }
+        if frames.len() < file.frames.len() {
+            let (copies, file) = (file.frames.len() - frames.len(), file.path.display());
+            notes.push(format!("{copies} entries of {file} are there for the second time and are left out"));
+        }
+        Ok(Self { file, frames })
+    }
+
+    /// Frames with cameras at the wanted size and times in `[0, 1]`.
+    fn frames(
+        &self,
+        range: TimeRange,
+        options: &LoadOptions,
+        notes: &mut Vec<String>,
+    ) -> Result<Vec<Frame>, DataError> {
+        let headers = read_headers(self.frames.par_iter().map(|frame| frame.image.as_path()).collect::<Vec<_>>())?;
+        let Some(source) = headers.first().map(|header| header.size) else {
+            return Ok(Vec::new());
+        };
+        // One field of view for the split means one size, unless the file says another.
+        let other = self
+            .frames
+            .iter()
+            .zip(&headers)
+            .find(|(frame, header)| header.size != source && !self.file.gives_size(frame.index));
+        if let Some((frame, header)) = other {
+            let ((width, height), (expected_width, expected_height)) = (header.size, source);
+            let problem = format!(
+                "it is {width} x {height} pixels, expected {expected_width} x {expected_height} as the first image of its split"
+            );
+            return Err(DataError::image(&frame.image, problem, "make all images of a split the same size"));
+        }
+        let sizes = headers.iter().map(|header| header.size);
+        let masks = self.masks(&sizes.collect::<Vec<_>>())?;
+        let image = |(raw, mask): (&RawFrame, Option<Mask>)| {
+            let (rotation, center) = self.file.pose(raw.index)?;
+            let (intrinsics, lens) = self.file.camera(raw.index, &raw.image)?;
+            Ok(PosedImage {
+                name: raw.image.file_stem().map_or_else(|| raw.index.to_string(), |stem| stem.to_string_lossy().into()),
+                path: raw.image.clone(),
+                mask,
+                // Blender's numbers are 32 bits wide. The figures in docs/results.md were made with them as such.
+                rotation: rotation.as_mat3().as_dmat3(),
+                center: center.as_vec3().as_dvec3(),
+                intrinsics,
+                lens,
+                camera_id: 0,
+                time: range.at(raw.time),
+                described: (self.file.path.clone(), Transforms::pose_field(raw.index)),
+            })
+        };
+        let images: Vec<PosedImage> = self.frames.iter().zip(masks).map(image).collect::<Result<_, DataError>>()?;
+        posed::frames(&images, options, notes)
+    }
+
+    /// The masks of the images, which have these sizes. All of them, or none: figures over a part of the views could be
+    /// taken for figures over all.
+    fn masks(&self, sizes: &[(u32, u32)]) -> Result<Vec<Option<Mask>>, DataError> {
+        let root = &self.file.root;
+        let expected = |raw: &RawFrame| root.join("mask").join(raw.image.strip_prefix(root).unwrap_or(&raw.image));
+        let paths: Vec<Option<PathBuf>> = self.frames.iter().map(|raw| files::find_image(&expected(raw))).collect();
+        let found: Vec<&Path> = paths.iter().flatten().map(PathBuf::as_path).collect();
+        if found.is_empty() {
+            return Ok(vec![None; paths.len()]);
+        }
+        if let Some((raw, _)) = self.frames.iter().zip(&paths).find(|(_, path)| path.is_none()) {
+            return Err(DataError::image(
+                &expected(raw),
+                format!(
+                    "this mask is missing, but {} of the {} images of its split have one",
+                    found.len(),
+                    paths.len()
+                ),
+                "copy it there, or remove the split's masks",
+            ));
+        }
+        for ((path, header), size) in found.iter().zip(read_headers(found.clone())?).zip(sizes) {
+            if header.size != *size {
+                let (width, height) = header.size;
+                let problem = format!("the mask is {width} x {height} pixels, its image {} x {}", size.0, size.1);
+                return Err(DataError::image(path, problem, "make masks of the images as they are"));
+            }
+        }
+        Ok(paths.into_iter().map(|path| path.map(|path| Mask { path, zero: MaskMeaning::Still })).collect())
+    }
+}
+
+fn read_time(file: &Transforms, i: usize) -> Result<f64, DataError> {
     let field = format!("frames[{i}].time");
     let expected = "a finite number of at least 0";
     let remedy = "give every frame its time (a static scene has 0 everywhere)";
-    let time = json::finite(path, &field, entry.get("time"), expected, remedy)?;
+    let time = json::finite(&file.path, &field, file.frames[i].get("time"), expected, remedy)?;
     if time < 0.0 {
         let problem = format!("{time}, expected {expected}");
-        return Err(DataError::field(path, field, problem, "shift the times so that the first is 0"));
+        return Err(DataError::field(&file.path, field, problem, "shift the times so that the first is 0"));
     }
-    Ok(RawFrame {
-        pose: read_pose(path, i, entry.get("transform_matrix"))?,
-        time,
-        image: find_image(root, path, i, entry.get("file_path"))?,
-    })
-}
-
-fn read_pose(path: &Path, i: usize, value: Option<&Value>) -> Result<[[f32; 4]; 4], DataError> {
-    let field = format!("frames[{i}].transform_matrix");
-    let remedy = "export the pose again as a 4x4 camera-to-world matrix";
-    let wrong_shape =
-        |what: String| DataError::field(path, field.clone(), format!("{what}, expected 4 rows of 4 numbers"), remedy);
-    let rows = value
-        .and_then(Value::as_array)
-        .filter(|rows| rows.len() == 4)
-        .ok_or_else(|| wrong_shape(json::describe(value)))?;
-    let mut pose = [[0.0f32; 4]; 4];
-    for (r, row) in rows.iter().enumerate() {
-        let row = row
-            .as_array()
-            .filter(|row| row.len() == 4)
-            .ok_or_else(|| wrong_shape(format!("row {r} is {}", json::describe(Some(row)))))?;
-        for (c, value) in row.iter().enumerate() {
-            let entry = format!("{field}[{r}][{c}]");
-            pose[r][c] = json::finite(path, &entry, Some(value), "a finite number", remedy)? as f32;
-        }
-    }
-    Ok(pose)
+    Ok(time)
 }
 
 /// The image of a frame: `file_path` itself, or with an extension added.
-fn find_image(root: &Path, path: &Path, i: usize, value: Option<&Value>) -> Result<PathBuf, DataError> {
-    let name = value.and_then(Value::as_str).filter(|name| !name.is_empty()).ok_or_else(|| {
-        let found = json::describe(value);
-        DataError::field(
-            path,
-            format!("frames[{i}].file_path"),
-            format!("{found}, expected the image's path, relative to the folder"),
-            "add the field to the frame",
-        )
-    })?;
-    let base = files::inside(root, path, &format!("frames[{i}].file_path"), name)?;
+fn find_image(file: &Transforms, i: usize) -> Result<PathBuf, DataError> {
+    let base = file.image(i)?;
     files::find_image(&base).ok_or_else(|| {
         let tried = if files::is_image(&base) { base.clone() } else { with_suffix(&base) };
         DataError::image(
             &tried,
-            format!("missing, but {} names it in frames[{i}].file_path", path.display()),
+            format!("missing, but {} names it in frames[{i}].file_path", file.path.display()),
             "copy the image there or remove the frame",
         )
     })
@@ -186,75 +221,4 @@ fn with_suffix(base: &Path) -> PathBuf {
     let mut name = base.as_os_str().to_owned();
     name.push(".png");
     name.into()
-}
-
-/// Frames with cameras at the wanted size and times in `[0, 1]`.
-fn frames(root: &Path, split: &RawSplit, range: TimeRange, options: &LoadOptions) -> Result<Vec<Frame>, DataError> {
-    let headers = read_headers(split.frames.par_iter().map(|frame| frame.image.as_path()).collect::<Vec<_>>())?;
-    let Some(source) = headers.first().map(|header| header.size) else {
-        return Ok(Vec::new());
-    };
-    // One field of view for the split means one size.
-    if let Some(i) = headers.iter().position(|header| header.size != source) {
-        let (found, expected) = (headers[i].size, source);
-        return Err(DataError::image(
-            &split.frames[i].image,
-            format!(
-                "it is {} x {} pixels, expected {} x {} as the first image of its split",
-                found.0, found.1, expected.0, expected.1
-            ),
-            "make all images of a split the same size",
-        ));
-    }
-    let (width, height) = posed::used_size(&split.frames[0].image, source, options)?;
-    let masks = find_masks(root, split, source)?;
-    let to_frame = |((i, raw), mask): ((usize, &RawFrame), Option<Mask>)| {
-        let camera = Camera::from_camera_to_world_opengl(&raw.pose, split.fov_x, source.0, source.1)
-            .map_err(|error| pose_error(&split.path, i, error))?;
-        let name = raw.image.file_stem().map_or_else(|| i.to_string(), |stem| stem.to_string_lossy().into_owned());
-        let frame =
-            Frame::new(name, camera.resized(width, height), range.at(raw.time) as f32, raw.image.clone(), source);
-        Ok(Frame { mask, ..frame })
-    };
-    split.frames.iter().enumerate().zip(masks).map(to_frame).collect()
-}
-
-/// The masks of a split's images, which are `source` = (width, height) pixels large. All of them, or none: figures over
-/// a part of the views could be taken for figures over all.
-fn find_masks(root: &Path, split: &RawSplit, source: (u32, u32)) -> Result<Vec<Option<Mask>>, DataError> {
-    let folder = root.join("mask");
-    let expected = |raw: &RawFrame| folder.join(raw.image.strip_prefix(root).unwrap_or(&raw.image));
-    let paths: Vec<Option<PathBuf>> = split.frames.iter().map(|raw| files::find_image(&expected(raw))).collect();
-    let found: Vec<&Path> = paths.iter().flatten().map(PathBuf::as_path).collect();
-    if found.is_empty() {
-        return Ok(vec![None; paths.len()]);
-    }
-    if let Some((raw, _)) = split.frames.iter().zip(&paths).find(|(_, path)| path.is_none()) {
-        return Err(DataError::image(
-            &expected(raw),
-            format!("this mask is missing, but {} of the {} images of its split have one", found.len(), paths.len()),
-            "copy it there, or remove the split's masks",
-        ));
-    }
-    for (path, header) in found.iter().zip(read_headers(found.clone())?) {
-        if header.size != source {
-            let (width, height) = header.size;
-            let problem = format!("the mask is {width} x {height} pixels, its image {} x {}", source.0, source.1);
-            return Err(DataError::image(path, problem, "make masks of the images as they are"));
-        }
-    }
-    Ok(paths.into_iter().map(|path| path.map(|path| Mask { path, zero: MaskMeaning::Still })).collect())
-}
-
-fn pose_error(path: &Path, i: usize, error: PoseError) -> DataError {
-    let (field, remedy) = match error {
-        PoseError::FieldOfView { .. } => {
-            ("camera_angle_x".to_string(), "give the angle in radians, large enough for a 32-bit number")
-        }
-        _ => (
-            format!("frames[{i}].transform_matrix"),
-            "export the pose again as a 4x4 camera-to-world matrix without scaling or mirroring",
-        ),
-    };
-    DataError::field(path, field, error.to_string(), remedy)
 }

@@ -126,7 +126,11 @@ impl Scene {
             Some(name) => layouts.by_name(name)?,
             None => layouts.detect(root)?,
         };
-        layout.open(root, options)
+        let mut scene = layout.open(root, options)?.with_usable_points(options.most_points);
+        if options.synchronize {
+            scene.put_in_step(options)?;
+        }
+        Ok(scene)
     }
 }
 

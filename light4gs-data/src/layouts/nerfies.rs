@@ -15,7 +15,7 @@ use crate::frame::{Frame, Mask, MaskMeaning};
 use crate::lens::{Distortion, Lens};
 use crate::options::LoadOptions;
 use crate::points::PointCloud;
-use crate::scene::{Scene, SplitFrames};
+use crate::scene::{Reading, Scene, SplitFrames};
 use glam::{DMat3, DVec3};
 use serde_json::Value;
 use std::collections::HashSet;
@@ -86,7 +86,7 @@ struct Entry {
 }
 
 fn open(layout: &'static str, root: &Path, options: &LoadOptions) -> Result<Scene, DataError> {
-    let entries = read_entries(root)?;
+    let (entries, reading) = read_entries(root)?;
     let folder = image_folder(root, &entries)?;
     let mut notes = Vec::new();
     let dataset = root.join("dataset.json");
@@ -101,7 +101,7 @@ fn open(layout: &'static str, root: &Path, options: &LoadOptions) -> Result<Scen
         posed::note_unmasked(&images, &mut notes);
     }
     let mut splits = SplitFrames::default();
-    for ((entry, _), frame) in entries.iter().zip(posed::frames(&images, options)?) {
+    for ((entry, _), frame) in entries.iter().zip(posed::frames(&images, options, &mut notes)?) {
         // The path of the camera through the capture, for videos.
         splits.video.push(Frame::without_image(entry.id.clone(), frame.camera, frame.time));
         if entry.tests {
@@ -112,13 +112,12 @@ fn open(layout: &'static str, root: &Path, options: &LoadOptions) -> Result<Scen
         }
     }
     let points = points(root, &splits, options)?;
-    let mut scene = Scene::new(layout, root, splits, points, options.background)?;
-    scene.notes = notes;
-    Ok(scene)
+    let scene = Scene::new(layout, root, splits, points, options.background)?;
+    Ok(scene.with_notes(notes).with_reading(reading))
 }
 
-/// The images in the order of `dataset.json`, with times and splits.
-fn read_entries(root: &Path) -> Result<Vec<Entry>, DataError> {
+/// The images in the order of `dataset.json`, with times and splits, and where the times come from.
+fn read_entries(root: &Path) -> Result<(Vec<Entry>, Reading), DataError> {
     let path = root.join("dataset.json");
     let document = json::read(&path)?;
     let ids = json::words(&path, "ids", document.get("ids"), REMEDY)?;
@@ -166,7 +165,8 @@ fn read_entries(root: &Path) -> Result<Vec<Entry>, DataError> {
     for entry in &mut entries {
         entry.time = range.at(entry.time);
     }
-    Ok(entries)
+    let times = format!("metadata.json, {range} mapped to 0 to 1");
+    Ok((entries, Reading { times, ..Reading::default() }))
 }
 
 /// The number that counts time, and the camera.

@@ -1,10 +1,58 @@
 //! `[data]`: the training data.
 
-use light4gs_keys::Bounds::{List, NameOrNone, Number, Whole, WholeOrNone};
-use light4gs_keys::{SHARE, keys, optional};
+use light4gs_keys::Bounds::{Flag, List, NameOrNone, Number, Whole, WholeOrNone};
+use light4gs_keys::{SHARE, choice, keys, optional};
 
 use crate::density::MOST_GAUSSIANS;
-use light4gs_data::Layouts;
+use light4gs_data::{CamerasFrom, Layouts, TimesFrom};
+
+choice! {
+    /// How times follow from the images' names, where the files give none.
+    #[derive(Default)]
+    pub enum TimesKind: "source of times" {
+        /// A date with a time of day, otherwise the last number, otherwise the order.
+        #[default]
+        Auto = "auto",
+        /// The last number.
+        Number = "number",
+        /// The natural order of each camera's names, one step a name.
+        Order = "order",
+    }
+}
+
+choice! {
+    /// How cameras follow from the images' names, in layouts that do not name cameras.
+    #[derive(Default)]
+    pub enum CamerasKind: "source of cameras" {
+        /// The folder, and the name without what counts the time.
+        #[default]
+        Auto = "auto",
+        /// There is one camera, which moves.
+        One = "one",
+        /// Each folder is a camera.
+        Folder = "folder",
+    }
+}
+
+impl From<TimesKind> for TimesFrom {
+    fn from(kind: TimesKind) -> Self {
+        match kind {
+            TimesKind::Auto => Self::Auto,
+            TimesKind::Number => Self::Number,
+            TimesKind::Order => Self::Order,
+        }
+    }
+}
+
+impl From<CamerasKind> for CamerasFrom {
+    fn from(kind: CamerasKind) -> Self {
+        match kind {
+            CamerasKind::Auto => Self::Auto,
+            CamerasKind::One => Self::One,
+            CamerasKind::Folder => Self::Folder,
+        }
+    }
+}
 
 keys! {
     /// Images, and the cloud that training starts from.
@@ -28,6 +76,14 @@ keys! {
             WholeOrNone { least: 8, most: 16_384 }, "ours";
         /// Color behind transparent pixels, each channel 0 to 1.
         background: [f32; 3] = [1.0; 3]; List { element: &SHARE, length: Some(3) }, "reference, D-NeRF: white";
+        /// Where the times of images come from, in the layouts `colmap` and `nerfstudio`, if their files have none. `light4gs
+        /// check` says what was read.
+        times: TimesKind = TimesKind::Auto; TimesKind::BOUNDS, "ours";
+        /// Which images are of one camera, in the same layouts.
+        cameras: CamerasKind = CamerasKind::Auto; CamerasKind::BOUNDS, "ours";
+        /// Whether cameras of a rig that are some frames ahead of the others, or behind, are moved in time. Without it,
+        /// `train` and `check` only say so.
+        synchronize: bool = false; Flag, "ours";
         /// Upper bound of the memory for decoded images. Images that do not fit are decoded again, ahead of the
         /// iterations that need them.
         memory_limit_mib: u64 = 2048; Whole { least: 16, most: 1 << 24 }, "ours";

@@ -41,7 +41,7 @@ pub use compression::{
     AttributesConfig, CompressionConfig, ContextTraining, FileProfile, PlaneStepsTraining, RateConfig, RateWeighting,
     ShTraining, WeightsConfig,
 };
-pub use data::DataConfig;
+pub use data::{CamerasKind, DataConfig, TimesKind};
 pub use device_name::{Adapter, DEVICES, DeviceName, UnknownDevice};
 pub use error::{ConfigError, Origin};
 pub use eval::{EvalConfig, EvalSplit};

@@ -1,5 +1,6 @@
 //! Measuring a decoded file: quality on held-out views, speed, size.
 
+mod advice;
 mod run;
 
 use std::path::Path;
@@ -94,6 +95,9 @@ pub struct Evaluation {
     /// Expected and coded bits, where the run has a record of its coding.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub coding: Option<CodingRecord>,
+    /// If the run came out badly: what its figures say about capture and schedule, and what to do.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub advice: Vec<String>,
 }
 
 /// A render next to its ground truth.
@@ -252,6 +256,7 @@ impl<F: DeformationField> DecodedScene<F> {
             training_seconds: None,
             splits,
             coding: None,
+            advice: Vec::new(),
         };
         Ok((evaluation, rendered))
     }

@@ -3,12 +3,13 @@
 use std::fs;
 
 use light4gs_codec::Limits;
-use light4gs_data::{DataError, Scene};
+use light4gs_data::{DataError, Scene, Split};
 use light4gs_model::DeformationField;
 
+use super::advice::advice;
 use super::{DecodedScene, Evaluation, RenderedView};
 use crate::config::Config;
-use crate::corrections::Corrections;
+use crate::corrections::{Corrections, Schedule};
 use crate::dataset::image_store;
 use crate::device::{self, describe};
 use crate::error::TrainError;
@@ -30,11 +31,14 @@ pub fn measure_run<F: DeformationField>(
     let device = device::open(config.device)?;
     let decoded = DecodedScene::<F>::open_with_limits(&folder.stream(), &Limits::large(), &device)?;
     let images = image_store(config);
-    let fit = Corrections::new(&config.train.corrections, scene, 0).fit();
+    let fit = Corrections::new(&config.train.corrections, scene, Schedule::default()).fit();
     let name = describe(config.device, &device);
     let (mut evaluation, views) = decoded.evaluate(scene, &images, &config.eval, fit.as_ref(), &name)?;
     let metrics = read_metrics(&folder.path("metrics.jsonl"))?;
     evaluation.training_seconds = metrics.last().map(|record| record.seconds);
+    if let Some(test) = evaluation.splits.iter().find(|split| split.split == Split::Test.name()) {
+        evaluation.advice = advice(config, test.scores.psnr(), &metrics);
+    }
     evaluation.coding = folder.read_json("coding.json")?;
     folder.write_json("eval.json", &evaluation)?;
     if config.eval.save_renders {

@@ -8,7 +8,7 @@ use std::fs;
 use std::io::Write;
 use std::path::{Path, PathBuf};
 
-use light4gs_data::{DataError, DatasetDigest, Scene, read_regular_file, write_atomically};
+use light4gs_data::{CaptureSummary, DataError, DatasetDigest, Scene, read_regular_file, write_atomically};
 use serde::{Deserialize, Serialize};
 
 use super::contents::{self, Contents, DATASET, FILES, FOLDERS, RECORD};
@@ -46,6 +46,9 @@ pub struct RunRecord {
     /// SHA-256 of the configuration with which it began.
     #[serde(default)]
     pub configuration: String,
+    /// What the dataset was taken for.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub capture: Option<CaptureSummary>,
     /// If this run only wrote the file: the record of the run that trained it.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub trained_by: Option<Box<RunRecord>>,
@@ -66,6 +69,7 @@ impl RunRecord {
             threads: rayon::current_num_threads(),
             begun: utc::now(),
             configuration: config.digest_text(),
+            capture: None,
             trained_by: None,
         })
     }
@@ -124,6 +128,15 @@ impl RunFolder {
         folder.write("config.toml", config.to_toml().as_bytes())?;
         folder.write_json(RECORD, &record)?;
         Ok(folder)
+    }
+
+    /// Adds to the run's record what its dataset is taken for.
+    ///
+    /// # Errors
+    /// [`TrainError`] if the record cannot be read or written.
+    pub fn record_capture(&self, capture: CaptureSummary) -> Result<(), TrainError> {
+        let record: RunRecord = read_json(&self.path(RECORD))?;
+        self.write_json(RECORD, &RunRecord { capture: Some(capture), ..record })
     }
 
     /// Refuses a folder in which no new run may be made; returns its contents.

@@ -1,6 +1,7 @@
 //! The command line: one file for each command.
 
 mod bench;
+mod check;
 mod compare;
 mod container;
 mod export;
@@ -46,6 +47,10 @@ enum Command {
     #[command(after_help = "Examples:\n  light4gs prepare walk.mp4 --out data/walk\n  light4gs prepare left.mp4 \
                             middle.mp4 right.mp4 --out data/stage\n  light4gs train data/walk --out runs/walk")]
     Prepare(prepare::Prepare),
+    /// Say what a dataset is taken for, before anything is trained: cameras, times, lens, masks, points, and what is not
+    /// used. The exit code is 2 where training could only fail.
+    #[command(after_help = "Example:\n  light4gs check data/walk --html walk.html")]
+    Check(check::Check),
     /// Train on a dataset, or on videos, which are prepared first.
     #[command(
         after_help = "Examples:\n  light4gs train data/dnerf/bouncing --config dnerf-bouncing-cpu --out runs/bouncing\n  light4gs train walk.mp4 --out runs/walk"
@@ -117,6 +122,7 @@ impl Cli {
         match self.command {
             Command::Quickstart(command) => command.run(),
             Command::Prepare(command) => command.run(),
+            Command::Check(command) => command.run(),
             Command::Train(command) => command.run(),
             Command::Resume(command) => command.run(),
             Command::Eval(command) => command.run(),

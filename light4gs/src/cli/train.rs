@@ -19,12 +19,13 @@ use light4gs_train::run::{RunFolder, RunRecord};
 use light4gs_train::table::{Align, Table};
 use light4gs_train::trainer::{Trainer, TrainerBuilder};
 
+use super::check::{Curves, refuse_problems, tell_capture, understand};
 use super::limits::LimitsArgument;
 use super::output::progress::ProgressBars;
 use super::output::{say, say_json, tell};
 use super::signals::stop_flag;
 use super::videos;
-use super::wishes::Wishes;
+use super::wishes::{Wishes, check_quality};
 
 /// Options for the output of a run.
 #[derive(Debug, Args)]
@@ -105,13 +106,14 @@ pub(super) fn train(
     // From here on requests to stop are noticed.
     stop_flag();
     let data = check_inputs(&config, scene)?;
-    for note in &data.notes {
-        tell(format_args!("note: {note}"));
-    }
+    let (capture, _) = understand(&config, &data, Curves::OfRigs)?;
+    tell_capture(&capture);
+    refuse_problems(scene, &capture)?;
     // If the encoder would refuse the scene, for example for a point at 3e38, the run that --overwrite replaces must
     // not be lost.
     Trainer::builder(config.clone(), data).check()?;
     let folder = RunFolder::create(out, Some(scene), &config, overwrite)?;
+    folder.record_capture(capture)?;
     let (_, record, config) = RunFolder::open(folder.root())?;
     let trainer = trainer(&config, &folder, &record, output)?.build()?;
     finish(trainer, &folder, &config, output)
@@ -196,7 +198,7 @@ fn finish(mut trainer: Trainer, folder: &RunFolder, config: &Config, output: &Ru
     if !output.json {
         say(format_args!("\nreport: {}", folder.path("report.html").display()))?;
     }
-    Ok(())
+    check_quality(evaluation.coding.as_ref(), &folder.stream())
 }
 
 #[derive(Debug, Args)]
@@ -279,7 +281,13 @@ impl Eval {
         }
         record.scene = self.scene.or(record.scene);
         let scene = Scene::open(record.dataset()?, &load_options(&config))?;
-        print_evaluation(&evaluate_run::<BuiltInField>(&folder, &config, &scene)?, self.json)
+        let evaluation = evaluate_run::<BuiltInField>(&folder, &config, &scene)?;
+        print_evaluation(&evaluation, self.json)?;
+        // Measuring has succeeded, whatever it says.
+        if let Some(missed) = evaluation.coding.as_ref().and_then(|coding| coding.missed_quality) {
+            tell(missed);
+        }
+        Ok(())
     }
 
     fn eval_file(self) -> Result<(), TrainError> {
@@ -310,9 +318,6 @@ fn print_evaluation(evaluation: &Evaluation, json: bool) -> Result<(), TrainErro
     if let Some(table) = evaluation.coding.as_ref().and_then(coding_table) {
         say(table)?;
     }
-    if let Some(missed) = evaluation.coding.as_ref().and_then(|coding| coding.missed_quality) {
-        tell(missed);
-    }
     let [width, height] = evaluation.resolution;
     say(format_args!(
         "{} Gaussians, {:.1} FPS at {width}×{height} on {}",
@@ -321,7 +326,7 @@ fn print_evaluation(evaluation: &Evaluation, json: bool) -> Result<(), TrainErro
     if let Some(seconds) = evaluation.training_seconds {
         say(format_args!("trained for {:.1} min", seconds / 60.0))?;
     }
-    Ok(())
+    evaluation.advice.iter().try_for_each(|advice| say(format_args!("advice: {advice}")))
 }
 
 /// Quality by split.

@@ -59,15 +59,12 @@ impl Observer for Messages {
 
     fn on_checkpoint(&mut self, _path: &Path) -> Result<(), TrainError> {
         let source = match &mut self.source {
-            Some(source) => {
-                source.refresh()?;
-                source
-            }
+            Some(source) => source,
             empty => empty.insert(ViewSource::run(&self.run, None)?),
         };
-        let file = self.run.with_extension("l4gs");
-        write(&file, source.bytes())?;
-        say(&json!({ "kind": "scene", "file": file, "status": source.status() }));
+        let (file, shown) = (self.run.with_extension("l4gs"), source.refresh());
+        write(&file, &shown.bytes)?;
+        say(&json!({ "kind": "scene", "file": file, "status": shown.status }));
         Ok(())
     }
 

@@ -3,7 +3,7 @@
 //! The model lies in `sparse/0`, `sparse`, `colmap/sparse/0`, `distorted/sparse/0` or the folder itself; where there
 //! are several (COLMAP writes one for each part of the capture that it could connect), the one with the most images is
 //! taken. The images lie in `images`, or a smaller version of them in `images_2`, `images_4`, `images_8`. COLMAP knows
-//! no time: it comes from the images' names, see [`places`]. One folder of numbered frames is one moving camera;
+//! no time: it comes from the images' names, see [`sequence`]. One folder of numbered frames is one moving camera;
 //! folders `cam00`, `cam01`... with the same numbers are a rig.
 
 mod binary;
@@ -12,14 +12,14 @@ mod text;
 
 use super::layout::DatasetLayout;
 use super::shared::files;
+use super::shared::names::Names;
 use super::shared::posed::{self, PosedImage};
-use super::shared::sequence::{held_out, places};
+use super::shared::sequence::{Sequence, held_out, sequence};
 use crate::error::DataError;
 use crate::options::LoadOptions;
 use crate::points::PointCloud;
 use crate::scene::{Scene, SplitFrames};
 use model::Model;
-use std::collections::HashSet;
 use std::path::{Path, PathBuf};
 
 /// Folders that are tried, in this order. Each may hold a model, or folders `0`, `1`... with one model each.
@@ -49,24 +49,27 @@ impl DatasetLayout for Colmap {
         let model = largest_model(root, &mut notes)?;
         let images_folder = find_images(root, &model)?;
         let posed = posed_images(&model, &images_folder, &mut notes)?;
-        note_unposed(&images_folder, &posed, &mut notes);
+        posed::note_unposed(&images_folder, &posed, &mut notes);
+        if root.join("masks").is_dir() {
+            notes.push("the folder masks/ is not read: COLMAP's masks hide what moves; to hide pixels from training, name masks in \
+                        a transforms.json (mask_path), see docs/data.md".to_owned());
+        }
         let names: Vec<String> = posed.iter().map(|image| image.name.clone()).collect();
-        let places = places(&names);
+        let Sequence { places, reading } = sequence(&names, options);
         let mut posed = posed;
         for (image, place) in posed.iter_mut().zip(&places) {
             (image.camera_id, image.time) = (place.camera, place.time);
             // A frame's name has no folders.
             image.name = frame_name(&image.name);
         }
-        let splits = split(posed::frames(&posed, options)?, &held_out(&places));
+        let splits = split(posed::frames(&posed, options, &mut notes)?, &held_out(&places));
         let points = match (model.points.is_empty(), PointCloud::find(root)?) {
             (_, Some(points)) => points,
             (false, None) => model.points,
             (true, None) => PointCloud::in_front_of(&splits.train, options),
         };
-        let mut scene = Scene::new(self.name(), root, splits, points, options.background)?;
-        scene.notes = notes;
-        Ok(scene)
+        let scene = Scene::new(self.name(), root, splits, points, options.background)?;
+        Ok(scene.with_notes(notes).with_reading(reading))
     }
 }
 
@@ -90,22 +93,31 @@ pub(super) fn frame_name(path: &str) -> String {
 
 /// The folders that hold a model, binary or text, all of them in the same folder of the dataset.
 fn model_folders(root: &Path) -> Vec<PathBuf> {
-    let holds_one = |folder: &Path| ["bin", "txt"].iter().any(|suffix| holds_model(folder, suffix));
-    let is_number = |path: &Path| files::name_of(path).bytes().all(|c| c.is_ascii_digit());
-    let of = |place: &&str| {
-        let place = root.join(place);
-        let mut found = files::entries(&place, |path| is_number(path) && holds_one(path)).unwrap_or_default();
-        if found.is_empty() && holds_one(&place) {
+    let mut names = Names::default();
+    for place in MODELS {
+        let Some(place) = names.find(&root.join(place)) else { continue };
+        let is_number = |path: &Path| files::name_of(path).bytes().all(|c| c.is_ascii_digit());
+        let mut found = files::entries(&place, is_number).unwrap_or_default();
+        found.retain(|folder| ["bin", "txt"].iter().any(|suffix| holds_model(folder, suffix)));
+        if found.is_empty() && ["bin", "txt"].iter().any(|suffix| holds_model(&place, suffix)) {
             found.push(place);
         }
-        found
-    };
-    MODELS.iter().map(of).find(|found| !found.is_empty()).unwrap_or_default()
+        if !found.is_empty() {
+            return found;
+        }
+    }
+    Vec::new()
+}
+
+/// A file of a model, whatever the case of its name.
+fn model_file(folder: &Path, name: &str, suffix: &str) -> PathBuf {
+    let path = folder.join(format!("{name}.{suffix}"));
+    Names::default().find(&path).unwrap_or(path)
 }
 
 /// Whether the files of every model are there with this suffix.
 fn holds_model(folder: &Path, suffix: &str) -> bool {
-    ["cameras", "images"].iter().all(|name| folder.join(format!("{name}.{suffix}")).is_file())
+    ["cameras", "images"].iter().all(|name| model_file(folder, name, suffix).is_file())
 }
 
 /// The model with the most images; of equal ones the first.
@@ -127,13 +139,20 @@ fn largest_model(root: &Path, notes: &mut Vec<String>) -> Result<Model, DataErro
         let (count, all, folder) = (model.images.len(), folders.len(), folder.display());
         notes.push(format!("COLMAP left {all} models; {folder} is used, the largest, with {count} images"));
     }
+    if ["bin", "txt"].iter().all(|suffix| holds_model(folder, suffix)) {
+        let changed =
+            |suffix: &str| std::fs::metadata(model_file(folder, "images", suffix)).and_then(|m| m.modified()).ok();
+        let age = if changed("txt") > changed("bin") { ", although the text files are newer" } else { "" };
+        let folder = folder.display();
+        notes.push(format!("{folder} has a model in binary and one in text: the binary files are used{age}"));
+    }
     Ok(model)
 }
 
 /// Reads the model of a folder.
 pub(crate) fn read_model(folder: &Path) -> Result<Model, DataError> {
     let is_binary = holds_model(folder, "bin");
-    let file = |name: &str| folder.join(format!("{name}.{}", if is_binary { "bin" } else { "txt" }));
+    let file = |name: &str| model_file(folder, name, if is_binary { "bin" } else { "txt" });
     let images_file = file("images");
     let (cameras, images) = if is_binary {
         (binary::cameras(&file("cameras"))?, binary::images(&images_file)?)
@@ -160,13 +179,17 @@ pub(crate) fn read_model(folder: &Path) -> Result<Model, DataError> {
 
 /// The folder that has most of the model's images.
 fn find_images(root: &Path, model: &Model) -> Result<PathBuf, DataError> {
-    let present = |folder: &PathBuf| {
+    let mut names = Names::default();
+    let mut present = |folder: &Path| {
         let sample = model.images.iter().step_by(model.images.len().div_ceil(32).max(1));
-        sample.filter(|image| files::find_image(&folder.join(&image.name)).is_some()).count()
+        let path = |name: &str| files::inside(folder, &model.images_file, "image name", name).ok();
+        let found = |path: &PathBuf| files::find_image(path).is_some();
+        sample.filter_map(|image| path(&image.name)).filter(|path| found(path) || names.find(path).is_some()).count()
     };
-    let folders: Vec<PathBuf> = IMAGES.iter().chain(&["."]).map(|name| root.join(name)).collect();
-    let best = folders.into_iter().rev().filter(|folder| folder.is_dir()).max_by_key(present);
-    best.filter(|folder| present(folder) > 0).ok_or_else(|| {
+    let folders = IMAGES.iter().chain(&["."]).rev().filter_map(|name| Names::default().find(&root.join(name)));
+    let counted = folders.filter(|folder| folder.is_dir()).map(|folder| (present(&folder), folder));
+    let best = counted.max_by_key(|(count, _)| *count).filter(|(count, _)| *count > 0);
+    best.map(|(_, folder)| folder).ok_or_else(|| {
         let first = model.images.first().map_or("", |image| image.name.as_str());
         let mut places = IMAGES.iter().chain(&["."]).map(|name| root.join(name).join(first));
         if let Some(found) = places.find(|path| files::is_of_other_format(path)) {
@@ -205,16 +228,4 @@ fn posed_images(model: &Model, folder: &Path, notes: &mut Vec<String>) -> Result
         }
     });
     Ok(posed.collect())
-}
-
-/// Says how many images beside the posed ones have no pose.
-fn note_unposed(folder: &Path, posed: &[PosedImage], notes: &mut Vec<String>) {
-    let known: HashSet<&Path> = posed.iter().map(|image| image.path.as_path()).collect();
-    let folders: HashSet<&Path> = posed.iter().filter_map(|image| image.path.parent()).collect();
-    let images = folders.iter().flat_map(|folder| files::images(folder).unwrap_or_default());
-    let unposed = images.filter(|path| !known.contains(path.as_path())).count();
-    if unposed > 0 {
-        let (folder, all) = (folder.display(), unposed + posed.len());
-        notes.push(format!("{unposed} of the {all} images in {folder} have no pose and are left out"));
-    }
 }

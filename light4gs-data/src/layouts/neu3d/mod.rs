@@ -66,11 +66,12 @@ impl DatasetLayout for Neu3d {
         let wanted = options.frames.map_or(length, |wanted| wanted as f64);
         if wanted > length.ceil() {
             notes.push(format!(
-                "`data.frames` asks for {wanted} frames, but there are {}: times are shares of those",
-                length.ceil()
+                "`data.frames` says {wanted} frames, but there are {}: times end at {:.3}, as of a part of a longer capture",
+                length.ceil(),
+                (length - 1.0) / wanted
             ));
         }
-        let images = images(&path, &poses, &cameras, &rows, found, length.min(wanted));
+        let images = images(&path, &poses, &cameras, &rows, found, wanted);
         let mut splits = SplitFrames::default();
         for frame in posed::frames(&images, options, &mut notes)? {
             if frame.camera_id == 0 { splits.test.push(frame) } else { splits.train.push(frame) }

@@ -72,38 +72,57 @@ pub(crate) fn natural(a: &str, b: &str) -> Ordering {
     left.len().cmp(&right.len()).then_with(|| a.cmp(b))
 }
 
-/// A path from a file of the dataset, as a path below `root`. Paths that leave the folder are refused: absolute ones,
-/// and those with more `..` than folders before them.
+/// A path from a file of the dataset, as a path below `root`. It may be absolute or climb out of the folder, if it comes
+/// back into it; others are refused. Nothing is looked up but `root` itself.
 ///
 /// `file` and `field` say where the path was found.
 pub(crate) fn inside(root: &Path, file: &Path, field: &str, name: &str) -> Result<PathBuf, DataError> {
     // Files from Windows may have the other separator.
     let name = if name.contains('/') { name.to_owned() } else { name.replace('\\', "/") };
-    let mut below = PathBuf::new();
-    for part in Path::new(&name).components() {
-        let allowed = match part {
-            Component::CurDir => true,
-            Component::Normal(part) => {
-                below.push(part);
-                true
-            }
-            Component::ParentDir => below.pop(),
-            Component::RootDir | Component::Prefix(_) => false,
-        };
-        if !allowed {
-            return Err(DataError::field(
-                file,
-                field,
-                format!("`{}` leads out of the dataset's folder", shorten(&name)),
-                "copy the images into the folder and name them relative to it",
-            ));
-        }
-    }
+    let below = below(root, &name).ok_or_else(|| {
+        DataError::field(
+            file,
+            field,
+            format!("`{}` leads out of the dataset's folder", shorten(&name)),
+            "copy the images into the folder and name them relative to it",
+        )
+    })?;
     if below.as_os_str().is_empty() {
         let problem = format!("`{}` names no file", shorten(&name));
         return Err(DataError::field(file, field, problem, "write the file's path, relative to the folder"));
     }
     Ok(root.join(below))
+}
+
+/// The path relative to `root`, without `.` and `..`; `None` if it leads out of it.
+fn below(root: &Path, name: &str) -> Option<PathBuf> {
+    // As on Windows, where no such component has its own name.
+    if matches!(name.as_bytes(), [drive, b':', b'/', ..] if drive.is_ascii_alphabetic()) && cfg!(not(windows)) {
+        return None;
+    }
+    let path = Path::new(name);
+    if let Some(path) = normal(path).filter(|path| !path.has_root()) {
+        return Some(path);
+    }
+    let folders = [std::path::absolute(root).ok(), root.canonicalize().ok()];
+    folders.into_iter().flatten().find_map(|folder| {
+        let folder = normal(&folder)?;
+        Some(normal(&folder.join(path))?.strip_prefix(&folder).ok()?.to_path_buf())
+    })
+}
+
+/// A path without `.` and `..`; `None` if it climbs above its beginning.
+fn normal(path: &Path) -> Option<PathBuf> {
+    let mut out = PathBuf::new();
+    for part in path.components() {
+        match part {
+            Component::CurDir => {}
+            Component::ParentDir if !out.pop() => return None,
+            Component::ParentDir => {}
+            part => out.push(part),
+        }
+    }
+    Some(out)
 }
 
 /// The image of a path with or without suffix, in upper or lower case; `None` where there is none. If there is no file
@@ -170,7 +189,10 @@ mod tests {
         let inside = |name: &str| inside(root, Path::new("t.json"), "file_path", name);
         assert_eq!(inside("./train/../test/a.png").unwrap(), root.join("test/a.png"));
         assert_eq!(inside("images\\a.png").unwrap(), root.join("images/a.png"));
-        for bad in ["../a.png", "/etc/passwd", "a/../../b", "", ".", "\x1b[31m/../../x"] {
+        assert_eq!(inside("/data/images/a.png").unwrap(), root.join("images/a.png"));
+        assert_eq!(inside("../data/images/a.png").unwrap(), root.join("images/a.png"));
+        let drive = "C:/Users/x/images/a.png";
+        for bad in ["../a.png", "/etc/passwd", "/database/a.png", "a/../../b", "", ".", "\x1b[31m/../../x", drive] {
             let message = inside(bad).unwrap_err().to_string();
             assert!(message.contains("t.json: file_path") && message.contains("; "), "{message}");
             assert!(!message.contains('\x1b'));

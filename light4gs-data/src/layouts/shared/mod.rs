@@ -3,7 +3,10 @@
 
 pub(crate) mod files;
 pub(super) mod json;
+mod moment;
+pub(super) mod names;
 pub(super) mod npy;
 pub(super) mod posed;
 pub(super) mod sequence;
 pub(super) mod times;
+pub(super) mod transforms;

@@ -1,14 +1,17 @@
 //! From images with poses, as a reader finds them, to the frames of a scene.
 
 use super::files;
+use super::names::Names;
 use crate::camera::{Camera, Intrinsics, PoseError};
 use crate::error::DataError;
 use crate::frame::{Frame, Mask};
-use crate::images::{ImageHeader, orientation, read_headers, turns_sideways};
+use crate::images::{self, ImageHeader, read_headers, turns_sideways};
 use crate::lens::Lens;
 use crate::options::LoadOptions;
 use glam::{DMat3, DVec3};
+use image::metadata::Orientation;
 use rayon::prelude::*;
+use std::collections::HashSet;
 use std::path::{Path, PathBuf};
 
 /// Most pixels of an image as it is used, so that several fit into memory.
@@ -35,17 +38,20 @@ pub(in crate::layouts) struct PosedImage {
 }
 
 /// Reads the headers of the images, and returns frames at the size that the options ask for.
-pub(in crate::layouts) fn frames(images: &[PosedImage], options: &LoadOptions) -> Result<Vec<Frame>, DataError> {
+pub(in crate::layouts) fn frames(
+    images: &[PosedImage],
+    options: &LoadOptions,
+    notes: &mut Vec<String>,
+) -> Result<Vec<Frame>, DataError> {
     let headers = read_headers(images.par_iter().map(|image| image.path.as_path()).collect::<Vec<_>>())?;
-    // Masks may have another size. This makes sure before training that they are images.
-    read_headers(
-        images.iter().filter_map(|image| image.mask.as_ref()).map(|mask| mask.path.as_path()).collect::<Vec<_>>(),
-    )?;
-    images.iter().zip(headers).map(|(image, header)| frame(image, header, options)).collect()
+    let sizes: Vec<(u32, u32)> =
+        images.iter().zip(&headers).map(|(image, header)| upright_size(image, *header)).collect::<Result<_, _>>()?;
+    check_masks(images, &sizes)?;
+    note_rotations(images, &headers, &sizes, notes);
+    images.iter().zip(sizes).map(|(image, size)| frame(image, size, options)).collect()
 }
 
-fn frame(image: &PosedImage, header: ImageHeader, options: &LoadOptions) -> Result<Frame, DataError> {
-    let source = upright_size(image, header)?;
+fn frame(image: &PosedImage, source: (u32, u32), options: &LoadOptions) -> Result<Frame, DataError> {
     let camera = camera(image, &image.intrinsics.resized(source.0, source.1))?;
     let (width, height) = used_size(&image.path, source, options)?;
     let mut frame =
@@ -92,10 +98,10 @@ fn upright_size(image: &PosedImage, header: ImageHeader) -> Result<(u32, u32), D
     let sideways =
         (width > height && expected_width < expected_height) || (width < height && expected_width > expected_height);
     if !sideways {
-        return Ok((width, height));
+        return check_shape(image, (width, height));
     }
-    if turns_sideways(orientation(&image.path)?) {
-        return Ok((height, width));
+    if turns_sideways(header.orientation) {
+        return check_shape(image, (height, width));
     }
     Err(DataError::image(
         &image.path,
@@ -106,6 +112,61 @@ fn upright_size(image: &PosedImage, header: ImageHeader) -> Result<(u32, u32), D
         ),
         "turn the image, or estimate the poses again from the images as they are",
     ))
+}
+
+/// The size of an image, if its shape is that of its camera's picture.
+fn check_shape(image: &PosedImage, size: (u32, u32)) -> Result<(u32, u32), DataError> {
+    let expected = (image.intrinsics.width, image.intrinsics.height);
+    if images::same_shape(size, expected) {
+        return Ok(size);
+    }
+    let file = image.described.0.display();
+    let problem = format!(
+        "it is {} x {} pixels, but {file} says that its camera is {} x {}: the shapes differ, so it was cropped or stretched \
+         after its pose was estimated",
+        size.0, size.1, expected.0, expected.1
+    );
+    let remedy =
+        "use the images that the poses were estimated from, or correct size, focal lengths and principal point";
+    Err(DataError::image(&image.path, problem, remedy))
+}
+
+/// Makes sure before training that masks are images, of the shape of what they mask. Their sizes may differ.
+fn check_masks(posed: &[PosedImage], sizes: &[(u32, u32)]) -> Result<(), DataError> {
+    let masked: Vec<_> =
+        posed.iter().zip(sizes).filter_map(|(image, size)| Some((size, image.mask.as_ref()?))).collect();
+    let headers = read_headers(masked.par_iter().map(|(_, mask)| mask.path.as_path()).collect::<Vec<_>>())?;
+    masked
+        .into_iter()
+        .zip(headers)
+        .try_for_each(|((size, mask), header)| images::check_shape(&mask.path, header.size, *size))
+}
+
+/// Says how many images have an EXIF rotation that is ignored.
+fn note_rotations(images: &[PosedImage], headers: &[ImageHeader], sizes: &[(u32, u32)], notes: &mut Vec<String>) {
+    let ignored = |(_, (header, size)): &(&PosedImage, (&ImageHeader, &(u32, u32)))| {
+        header.orientation != Orientation::NoTransforms && header.size == **size
+    };
+    let mut turned = images.iter().zip(headers.iter().zip(sizes)).filter(ignored);
+    if let Some((first, _)) = turned.next() {
+        let (count, all, first) = (turned.count() + 1, images.len(), first.path.display());
+        notes.push(format!(
+            "{count} of the {all} images have an EXIF rotation that is ignored, as by the programs that estimate poses: if \
+             the poses are those of turned images, turn the pixels; the first is {first}"
+        ));
+    }
+}
+
+/// Says how many images in the folders of the posed ones have no pose.
+pub(in crate::layouts) fn note_unposed(folder: &Path, posed: &[PosedImage], notes: &mut Vec<String>) {
+    let known: HashSet<&Path> = posed.iter().map(|image| image.path.as_path()).collect();
+    let folders: HashSet<&Path> = posed.iter().filter_map(|image| image.path.parent()).collect();
+    let images = folders.iter().flat_map(|folder| files::images(folder).unwrap_or_default());
+    let unposed = images.filter(|path| !known.contains(path.as_path())).count();
+    if unposed > 0 {
+        let (folder, all) = (folder.display(), unposed + posed.len());
+        notes.push(format!("{unposed} of the {all} images in {folder} have no pose and are left out"));
+    }
 }
 
 /// Adds a note with the number of images without a mask, where a capture has masks.
@@ -128,9 +189,11 @@ pub(in crate::layouts) fn other_format(path: &Path) -> DataError {
     DataError::image(path, problem, remedy)
 }
 
-/// Leaves out the images whose file is missing, and adds a note; if more than half are missing, it is an error.
+/// Leaves out the images whose file is missing or listed before, and adds notes; if more than half are missing, it is an
+/// error.
 ///
-/// `file_of` gives the file that an image should have, and the one that it has.
+/// `file_of` gives the file that an image should have, and the one that it has. Where it has none, a file is taken whose
+/// name differs only in case, or in the form of Unicode.
 pub(in crate::layouts) fn present<T>(
     described_in: &Path,
     images: Vec<T>,
@@ -139,12 +202,23 @@ pub(in crate::layouts) fn present<T>(
 ) -> Result<Vec<(T, PathBuf)>, DataError> {
     let count = images.len();
     let mut missing: Option<(PathBuf, usize)> = None;
+    let mut copies: Option<(PathBuf, usize)> = None;
     let mut found = Vec::with_capacity(count);
+    let (mut names, mut known) = (Names::default(), HashSet::new());
     for image in images {
-        match file_of(&image) {
-            (_, Some(path)) => found.push((image, path)),
-            (expected, None) => missing.get_or_insert((expected, 0)).1 += 1,
+        let (expected, path) = file_of(&image);
+        match path.or_else(|| names.find(&expected).filter(|path| files::is_image(path) && path.is_file())) {
+            Some(path) if known.insert(path.clone()) => found.push((image, path)),
+            Some(path) => copies.get_or_insert((path, 0)).1 += 1,
+            None => missing.get_or_insert((expected, 0)).1 += 1,
         }
+    }
+    if let Some((first, again)) = copies {
+        notes.push(format!(
+            "{again} entries of {} name an image for the second time and are left out; the first is {}",
+            described_in.display(),
+            first.display()
+        ));
     }
     let Some((first, absent)) = missing else {
         return Ok(found);

@@ -1,7 +1,10 @@
 //! Cameras, times and splits from the images' names, for captures whose files do not have them.
 
 use super::files::{natural, stem_of};
-use std::collections::{BTreeSet, HashMap};
+use super::moment::moment;
+use crate::options::{CamerasFrom, LoadOptions, TimesFrom};
+use crate::scene::Reading;
+use std::collections::{BTreeMap, BTreeSet, HashMap};
 use std::path::Path;
 
 /// Where no camera can be held out, one of this many times is.
@@ -9,7 +12,9 @@ const HELD_OUT_EVERY: usize = 8;
 /// A rig with fewer cameras cannot do without one.
 const LEAST_CAMERAS: usize = 4;
 /// If the numbers have larger gaps than this factor, they are no frame numbers.
-const SPARSEST: u64 = 20;
+const SPARSEST: f64 = 20.0;
+/// Times of day that follow each other in a capture are closer than this, seconds.
+const LONGEST_PAUSE: f64 = 600.0;
 
 /// Camera and time of an image.
 #[derive(Clone, Debug, PartialEq)]
@@ -20,64 +25,180 @@ pub(in crate::layouts) struct Place {
     pub(in crate::layouts) time: f64,
 }
 
-/// Cameras and times of images, from their paths relative to the folder of images.
-///
-/// The last number of a name counts the times. The text before it, with the folder, names the camera:
-/// `cam03/0017.png` and `cam03_0017.png` are both time 17 of camera `cam03`, and `frame_0017.png` alone is a moving
-/// camera. Where an image was left out, the numbers leave a gap in time, as they should. Names without such numbers are
-/// taken in natural order, one time each.
-pub(in crate::layouts) fn places(names: &[String]) -> Vec<Place> {
-    numbered(names).unwrap_or_else(|| {
-        let mut order: Vec<usize> = (0..names.len()).collect();
-        order.sort_by(|a, b| natural(&names[*a], &names[*b]));
-        let mut places = vec![Place { camera: 0, time: 0.0 }; names.len()];
-        for (rank, i) in order.into_iter().enumerate() {
-            places[i].time = share(rank as u64, names.len().saturating_sub(1) as u64);
-        }
-        places
-    })
+/// Cameras and times of images, and where they come from.
+pub(in crate::layouts) struct Sequence {
+    /// One for each image.
+    pub(in crate::layouts) places: Vec<Place>,
+    pub(in crate::layouts) reading: Reading,
 }
 
-fn numbered(names: &[String]) -> Option<Vec<Place>> {
-    let keys: Vec<(String, u64)> = names.iter().map(|name| camera_and_number(name)).collect::<Option<_>>()?;
+/// What a name says: its camera, and what counts its time.
+type Key = (String, Instant);
+
+/// A time in a name. Numbers of all kinds are exact as float64 up to 2^53.
+#[derive(Clone, Copy, Debug, PartialEq)]
+struct Instant(f64);
+
+impl Eq for Instant {}
+
+impl Ord for Instant {
+    fn cmp(&self, other: &Self) -> std::cmp::Ordering {
+        self.0.total_cmp(&other.0)
+    }
+}
+
+impl PartialOrd for Instant {
+    fn partial_cmp(&self, other: &Self) -> Option<std::cmp::Ordering> {
+        Some(self.cmp(other))
+    }
+}
+
+/// Cameras and times of images, from their paths relative to the folder of images.
+///
+/// A date with a time of day gives the time; otherwise the last number of a name counts the times. The text beside it,
+/// with the folder, names the camera: `cam03/0017.png` and `cam03_0017.png` are both time 17 of camera `cam03`, and
+/// `frame_0017.png` alone is a moving camera. Where an image was left out, the numbers leave a gap in time, as they
+/// should. Names without such numbers are taken in natural order, one time each.
+pub(in crate::layouts) fn sequence(names: &[String], options: &LoadOptions) -> Sequence {
+    let camera = |name: &str, rest: String| match options.cameras {
+        CamerasFrom::Auto => rest,
+        CamerasFrom::One => String::new(),
+        CamerasFrom::Folder => folder_of(name),
+    };
+    let keys = |key: fn(&str) -> Option<Key>| -> Option<Vec<Key>> {
+        let of = |name: &String| key(name).map(|(rest, instant)| (camera(name, rest), instant));
+        names.iter().map(of).collect()
+    };
+    let chosen = options.cameras != CamerasFrom::Auto;
+    let auto = options.times == TimesFrom::Auto;
+    let by_moment = || {
+        keys(camera_and_moment)
+            .filter(|_| auto)
+            .filter(|keys| are_moments(names, keys))
+            .and_then(|keys| places(&keys, chosen, f64::INFINITY))
+    };
+    let by_number = || {
+        keys(camera_and_number)
+            .filter(|_| options.times != TimesFrom::Order)
+            .and_then(|keys| places(&keys, chosen, SPARSEST))
+    };
+    let (found, times) = match (by_moment(), by_number) {
+        (Some(places), _) => (places, "the date and time of day in the images' names"),
+        (None, by_number) => match by_number() {
+            Some((places, true)) => {
+                ((places, true), "the order of the numbers in the images' names, which have large gaps")
+            }
+            Some(found) => (found, "the last number in the images' names"),
+            None => ((in_order(names, options.cameras), false), "the order of the images' names, one step each"),
+        },
+    };
+    let places = found.0;
+    let cameras = places.iter().map(|place| place.camera).max().map_or(0, |last| last + 1);
+    let cameras = match (cameras, options.cameras) {
+        (1, _) => "one moving camera".to_owned(),
+        (count, CamerasFrom::Folder) => format!("{count}, one a folder"),
+        (count, _) => format!("{count}, by the text of the images' names and folders beside what counts the time"),
+    };
+    Sequence { places, reading: Reading { cameras, times: times.to_owned() } }
+}
+
+/// Whether moments in names are meant as such. A time of day without a date is one only where it runs on: cameras that are
+/// numbered like hours would leave gaps of an hour.
+fn are_moments(names: &[String], keys: &[Key]) -> bool {
+    if names.iter().all(|name| moment(&stem_of(Path::new(name))).is_some_and(|moment| moment.dated)) {
+        return true;
+    }
+    let mut seconds: Vec<f64> = keys.iter().map(|(_, instant)| instant.0).collect();
+    seconds.sort_by(f64::total_cmp);
+    seconds.windows(2).all(|pair| pair[1] - pair[0] <= LONGEST_PAUSE)
+}
+
+/// One time for each name of a camera, in natural order.
+fn in_order(names: &[String], cameras: CamerasFrom) -> Vec<Place> {
+    let mut order: Vec<usize> = (0..names.len()).collect();
+    order.sort_by(|a, b| natural(&names[*a], &names[*b]));
+    let camera = |name: &str| if cameras == CamerasFrom::Folder { folder_of(name) } else { String::new() };
+    let mut known: Vec<(String, u64)> = Vec::new();
+    let mut places = vec![Place { camera: 0, time: 0.0 }; names.len()];
+    let mut ranks = vec![0; names.len()];
+    for i in order {
+        let name = camera(&names[i]);
+        let at = known.iter().position(|(camera, _)| *camera == name).unwrap_or_else(|| {
+            known.push((name, 0));
+            known.len() - 1
+        });
+        (places[i].camera, ranks[i]) = (at as u32, known[at].1);
+        known[at].1 += 1;
+    }
+    let last = ranks.iter().copied().max().unwrap_or(0);
+    for (place, rank) in places.iter_mut().zip(ranks) {
+        place.time = share(rank, last);
+    }
+    places
+}
+
+/// Places of images, and whether ranks stand for times since the gaps between them are too large. `None` where the keys
+/// count something else than times: there are as many cameras as names, or two images have the same place.
+fn places(keys: &[Key], chosen: bool, sparsest: f64) -> Option<(Vec<Place>, bool)> {
     let mut cameras: Vec<&str> = keys.iter().map(|(camera, _)| camera.as_str()).collect();
     cameras.sort_by(|a, b| natural(a, b));
     cameras.dedup();
-    let instants: BTreeSet<u64> = keys.iter().map(|(_, number)| *number).collect();
-    let unique: BTreeSet<&(String, u64)> = keys.iter().collect();
-    // If there are as many cameras as names, or two images with the same place, the numbers count something else.
-    if unique.len() < keys.len() || (cameras.len() > 1 && 2 * cameras.len() > keys.len()) {
+    let instants: BTreeSet<Instant> = keys.iter().map(|(_, instant)| *instant).collect();
+    let unique: BTreeSet<&Key> = keys.iter().collect();
+    if unique.len() < keys.len() || (!chosen && cameras.len() > 1 && 2 * cameras.len() > keys.len()) {
         return None;
     }
-    let (first, last) = (*instants.first()?, *instants.last()?);
-    let sparse = last - first > SPARSEST * instants.len() as u64;
-    let ranks: HashMap<u64, u64> = instants.iter().enumerate().map(|(rank, number)| (*number, rank as u64)).collect();
-    let time = |number: u64| {
-        if sparse { share(ranks[&number], instants.len() as u64 - 1) } else { share(number - first, last - first) }
+    let (first, last) = (instants.first()?.0, instants.last()?.0);
+    let sparse = last - first > sparsest * instants.len() as f64;
+    let ranks: BTreeMap<Instant, u64> =
+        instants.iter().enumerate().map(|(rank, instant)| (*instant, rank as u64)).collect();
+    let time = |instant: Instant| {
+        if sparse {
+            share(ranks[&instant], instants.len() as u64 - 1)
+        } else if last > first {
+            (instant.0 - first) / (last - first)
+        } else {
+            0.0
+        }
     };
-    let camera = |name: &str| cameras.iter().position(|known| *known == name).unwrap_or(0) as u32;
-    Some(keys.iter().map(|(name, number)| Place { camera: camera(name), time: time(*number) }).collect())
+    let numbers: HashMap<&str, u32> = cameras.iter().enumerate().map(|(i, name)| (*name, i as u32)).collect();
+    Some((
+        keys.iter().map(|(name, instant)| Place { camera: numbers[name.as_str()], time: time(*instant) }).collect(),
+        sparse,
+    ))
 }
 
 fn share(part: u64, whole: u64) -> f64 {
     if whole == 0 { 0.0 } else { part as f64 / whole as f64 }
 }
 
-/// The folder and the stem up to its last number, and that number.
-fn camera_and_number(name: &str) -> Option<(String, u64)> {
-    let path = Path::new(name);
-    let stem = stem_of(path);
+/// The folder of a path, as text.
+fn folder_of(name: &str) -> String {
+    Path::new(name).parent().map(|parent| parent.to_string_lossy().into_owned()).unwrap_or_default()
+}
+
+/// The folder and the stem without its moment, and that moment.
+fn camera_and_moment(name: &str) -> Option<Key> {
+    let stem = stem_of(Path::new(name));
+    let moment = moment(&stem)?;
+    let (start, end) = moment.place;
+    Some((format!("{}/{}|{}", folder_of(name), &stem[..start], &stem[end..]), Instant(moment.seconds)))
+}
+
+/// The folder and the stem without its last number, and that number.
+fn camera_and_number(name: &str) -> Option<Key> {
+    let stem = stem_of(Path::new(name));
     let end = stem.rfind(|c: char| c.is_ascii_digit())? + 1;
     let start = stem[..end]
         .rfind(|c: char| !c.is_ascii_digit())
         .map_or(0, |i| i + stem[i..].chars().next().map_or(1, char::len_utf8));
-    let number = stem[start..end].parse().ok()?;
-    let folder = path.parent().map(|parent| parent.to_string_lossy().into_owned()).unwrap_or_default();
-    Some((format!("{folder}/{}|{}", &stem[..start], &stem[end..]), number))
+    let number: u64 = stem[start..end].parse().ok().filter(|number| *number < 1 << 53)?;
+    Some((format!("{}/{}|{}", folder_of(name), &stem[..start], &stem[end..]), Instant(number as f64)))
 }
 
 /// Whether each image is held out for testing, in a dataset without splits. From a rig, camera 0 is held out, as is
-/// usual; with fewer than 4 cameras, or a moving one, every eighth time, from the middle of the first eight.
+/// usual; with fewer than 4 cameras, or a moving one, every eighth time, from the middle of the first eight. Of a still
+/// scene, whose images all have the same time, it is every eighth image, and of a single image none.
 pub(in crate::layouts) fn held_out(places: &[Place]) -> Vec<bool> {
     let cameras: BTreeSet<u32> = places.iter().map(|place| place.camera).collect();
     if cameras.len() >= LEAST_CAMERAS {
@@ -87,6 +208,10 @@ pub(in crate::layouts) fn held_out(places: &[Place]) -> Vec<bool> {
     let mut instants: Vec<f64> = places.iter().map(|place| place.time).collect();
     instants.sort_by(f64::total_cmp);
     instants.dedup();
+    if instants.len() == 1 {
+        let offset = (HELD_OUT_EVERY / 2).min(places.len() / 2);
+        return (0..places.len()).map(|i| places.len() > 1 && i % HELD_OUT_EVERY == offset).collect();
+    }
     let offset = (HELD_OUT_EVERY / 2).min(instants.len() / 2);
     let rank = |time: f64| instants.partition_point(|t| *t < time);
     places.iter().map(|place| rank(place.time) % HELD_OUT_EVERY == offset).collect()
@@ -98,7 +223,39 @@ mod tests {
 
     fn read(names: &[&str]) -> Vec<(u32, f64)> {
         let names: Vec<String> = names.iter().map(|name| (*name).to_owned()).collect();
-        places(&names).iter().map(|place| (place.camera, place.time)).collect()
+        with(&LoadOptions::default(), &names)
+    }
+
+    fn with(options: &LoadOptions, names: &[String]) -> Vec<(u32, f64)> {
+        sequence(names, options).places.iter().map(|place| (place.camera, place.time)).collect()
+    }
+
+    #[test]
+    fn moments_in_names_are_times() {
+        let minutes = ["2026-11-28_12-30-10.png", "2026-11-28_12-30-50.png", "2026-11-28_12-31-30.png"];
+        assert_eq!(read(&minutes), [(0, 0.0), (0, 0.5), (0, 1.0)]);
+        assert_eq!(read(&["12-59-50.png", "13-00-10.png", "13-00-30.png"]), [(0, 0.0), (0, 0.5), (0, 1.0)]);
+        // Two cameras, and bursts that are counted.
+        let rig = ["l_20261128_123010.png", "l_20261128_123020.png", "r_20261128_123010.png", "r_20261128_123020.png"];
+        assert_eq!(read(&rig), [(0, 0.0), (0, 1.0), (1, 0.0), (1, 1.0)]);
+        let burst = ["20261128_123010_0001.png", "20261128_123010_0002.png", "20261128_123010_0003.png"];
+        assert_eq!(read(&burst), [(0, 0.0), (0, 0.5), (0, 1.0)]);
+        // Cameras, takes and frames that look like times of day.
+        let numbered = ["01-00-05.png", "01-00-06.png", "02-00-05.png", "02-00-06.png"];
+        assert_eq!(read(&numbered), [(0, 0.0), (0, 1.0), (1, 0.0), (1, 1.0)]);
+    }
+
+    #[test]
+    fn cameras_and_times_can_be_said() {
+        let names = ["a/01.png", "a/02.png", "b/31.png", "b/36.png"].map(str::to_owned);
+        let options = |cameras, times| LoadOptions { cameras, times, ..Default::default() };
+        let read = |cameras, times| with(&options(cameras, times), &names);
+        assert_eq!(read(CamerasFrom::One, TimesFrom::Order)[3], (0, 1.0));
+        assert_eq!(read(CamerasFrom::Folder, TimesFrom::Order), [(0, 0.0), (0, 1.0), (1, 0.0), (1, 1.0)]);
+        assert_eq!(read(CamerasFrom::Folder, TimesFrom::Number)[2], (1, 30.0 / 35.0));
+        assert_eq!(read(CamerasFrom::One, TimesFrom::Number)[2], (0, 30.0 / 35.0));
+        let said = sequence(&names, &options(CamerasFrom::Folder, TimesFrom::Order)).reading;
+        assert!(said.cameras.starts_with("2,") && said.times.contains("order"), "{said:?}");
     }
 
     #[test]
@@ -137,6 +294,9 @@ mod tests {
         assert_eq!(tests, [4, 12]);
         let few: Vec<Place> = (0..2).map(|i| place(0, i, 2)).collect();
         assert_eq!(held_out(&few), [false, true]);
+        let still: Vec<Place> = (0..12).map(|_| Place { camera: 0, time: 0.0 }).collect();
+        assert_eq!((0..12).filter(|i| held_out(&still)[*i]).collect::<Vec<_>>(), [4]);
+        assert_eq!((held_out(&still[..2]), held_out(&still[..1])), (vec![false, true], vec![false]));
         let rig: Vec<Place> = (0..4).flat_map(|c| (0..3).map(move |i| place(c, i, 3))).collect();
         assert_eq!(held_out(&rig).iter().filter(|test| **test).count(), 3);
         assert!(held_out(&rig)[..3].iter().all(|test| *test));

@@ -1,6 +1,7 @@
 //! Times as a capture's files give them, in whatever unit, as times in `[0, 1]`.
 
 use crate::error::DataError;
+use std::fmt;
 use std::path::Path;
 
 /// Times in `[0, 1]` that are closer than this are the same: captures have some thousands of frames.
@@ -36,6 +37,13 @@ impl TimeRange {
     /// A time in `[0, 1]`: 0 where all times are the same. One outside the range becomes its nearer end.
     pub(in crate::layouts) fn at(self, time: f64) -> f64 {
         if self.span > 0.0 { ((time - self.first) / self.span).clamp(0.0, 1.0) } else { 0.0 }
+    }
+}
+
+impl fmt::Display for TimeRange {
+    /// The first and the last time, as the capture's files have them.
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "{} to {}", self.first, self.first + self.span)
     }
 }
 

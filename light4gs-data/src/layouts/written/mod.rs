@@ -3,6 +3,7 @@
 
 mod capture;
 mod colmap;
+mod dnerf;
 mod nerfies;
 mod nerfstudio;
 mod neu3d;

@@ -203,7 +203,7 @@ fn the_scale_with_most_images_is_used() {
         .unwrap();
     fs::remove_file(root.join("rgb/4x/0001.png")).unwrap();
     let scene = Scene::open(root, &options()).unwrap();
-    assert_eq!((scene.train.len(), scene.test.len(), scene.notes.len()), (3, 1, 0), "{:?}", scene.notes);
+    assert_eq!((scene.train.len(), scene.test.len(), scene.notes.len()), (3, 1, 1), "{:?}", scene.notes);
     assert!(scene.train.iter().all(|frame| frame.path.starts_with(root.join("rgb/4x"))));
     assert_eq!(scene.test[0].path, jpeg);
 }

@@ -6,7 +6,7 @@ use crate::lens::Distortion;
 use serde_json::{Value, json};
 use std::fs;
 
-fn intrinsics(shot: &Shot) -> Value {
+pub(super) fn intrinsics(shot: &Shot) -> Value {
     let c = shot.pinhole;
     let mut value = json!({"fl_x": c.fx, "fl_y": c.fy, "cx": c.cx, "cy": c.cy, "w": SIZE.0, "h": SIZE.1});
     match shot.lens.map(|lens| lens.distortion) {
@@ -43,7 +43,8 @@ fn document(capture: &Capture, shared: bool) -> Value {
     top
 }
 
-fn write(root: &Path, capture: &Capture, document: &Value) {
+/// Writes the images that are not there yet.
+pub(super) fn write_images(root: &Path, capture: &Capture) {
     fs::create_dir_all(root.join("images")).unwrap();
     for (i, shot) in capture.shots.iter().enumerate() {
         let path = root.join(format!("images/{}.png", shot.name));
@@ -51,6 +52,10 @@ fn write(root: &Path, capture: &Capture, document: &Value) {
             capture.recorded(i).save_png(&path).unwrap();
         }
     }
+}
+
+fn write(root: &Path, capture: &Capture, document: &Value) {
+    write_images(root, capture);
     fs::write(root.join("transforms.json"), document.to_string()).unwrap();
 }
 
@@ -120,6 +125,9 @@ fn damaged_files_are_named() {
     refuses(&|v| v["w"] = json!(-4), &[file, "w", "-4"]);
     refuses(&|v| (v["w"], v["h"]) = (json!(50), json!(100)), &["frame_0000.png", "lies on its side"]);
     refuses(&|v| v["k1"] = json!(null), &[file, "k1"]);
+    // Cropped after the poses were estimated.
+    refuses(&|v| v["h"] = json!(SIZE.1 + 20), &["frame_0000.png", "97 x 74", "97 x 94", "cropped"]);
+    refuses(&|v| v["frames"][1]["transform_matrix"][3][0] = json!(2), &["frames[1].transform_matrix[3]", "last row"]);
     refuses(&|v| v["frames"][1]["transform_matrix"] = json!([[1, 0], [0, 1]]), &["frames[1].transform_matrix"]);
     refuses(&|v| v["frames"][1]["transform_matrix"][0][0] = json!(7), &["frames[1].transform_matrix", "rotation"]);
     refuses(&|v| v["frames"][1]["file_path"] = json!("/etc/passwd"), &["frames[1].file_path", "leads out"]);
@@ -153,6 +161,74 @@ fn the_fourth_coefficient_continues_the_polynomial() {
 }
 
 #[test]
+fn frames_that_are_listed_twice_count_once() {
+    let folder = tempfile::tempdir().unwrap();
+    let capture = Capture::moving("frame_", 6, None);
+    let mut document = document(&capture, true);
+    let copy = document["frames"][2].clone();
+    document["frames"].as_array_mut().unwrap().insert(4, copy);
+    write(folder.path(), &capture, &document);
+    let scene = check(folder.path(), "nerfstudio", &capture, by_name(&capture.shots));
+    assert_eq!((scene.train.len(), scene.test.len()), (5, 1));
+    assert_eq!(times(&scene, Split::Train), [0.0, 0.2, 0.4, 0.8, 1.0]);
+    let note = &scene.notes[0];
+    assert!(note.contains("1 entries") && note.contains("second time") && note.contains("frame_0002.png"), "{note}");
+}
+
+#[test]
+fn still_scenes_and_single_images() {
+    let folder = tempfile::tempdir().unwrap();
+    let capture = Capture::new(false, (0..12).map(|i| (format!("x{i}"), i as f32 / 11.0, 0.0, None)).collect());
+    let mut document = document(&capture, true);
+    for i in 0..12 {
+        document["frames"][i]["time"] = json!(3.5);
+    }
+    write(folder.path(), &capture, &document);
+    let scene = check(folder.path(), "nerfstudio", &capture, by_name(&capture.shots));
+    assert_eq!((scene.train.len(), scene.test.len()), (11, 1));
+    assert_eq!(times(&scene, Split::Train), [0.0]);
+    document["frames"].as_array_mut().unwrap().truncate(1);
+    write(folder.path(), &capture, &document);
+    let message = Scene::open(folder.path(), &options()).unwrap_err().to_string();
+    assert!(message.contains("1 image found, expected at least 2"), "{message}");
+}
+
+#[test]
+fn names_in_another_form_of_unicode_and_absolute_paths_are_found() {
+    let folder = tempfile::tempdir().unwrap();
+    let capture =
+        Capture::new(false, (0..4).map(|i| (format!("caf\u{e9}_{i}"), i as f32 / 3.0, i as f32 / 3.0, None)).collect());
+    let mut document = document(&capture, true);
+    let absolute = folder.path().join("images/caf\u{e9}_1.png");
+    document["frames"][0]["file_path"] = json!("Images/cafe\u{301}_0.PNG");
+    document["frames"][1]["file_path"] = json!(absolute);
+    let name = folder.path().file_name().unwrap().to_str().unwrap();
+    document["frames"][2]["file_path"] = json!(format!("../{name}/images/caf\u{e9}_2.png"));
+    write(folder.path(), &capture, &document);
+    check(folder.path(), "nerfstudio", &capture, by_name(&capture.shots));
+}
+
+#[test]
+fn what_is_left_out_or_ignored_is_said() {
+    let folder = tempfile::tempdir().unwrap();
+    let capture = Capture::moving("frame_", 9, None);
+    let notes = |change: &dyn Fn(&mut Value)| {
+        let mut document = document(&capture, true);
+        change(&mut document);
+        write(folder.path(), &capture, &document);
+        Scene::open(folder.path(), &options()).unwrap().notes.join("\n")
+    };
+    assert_eq!(notes(&|_| ()), "");
+    let missing = notes(&|v| v["ply_file_path"] = json!("no.ply"));
+    assert!(missing.contains("no.ply") && missing.contains("ply_file_path"), "{missing}");
+    let all: Vec<String> = capture.shots.iter().map(|shot| format!("images/{}.png", shot.name)).collect();
+    let held_out = notes(&|v| (v["train_filenames"], v["test_filenames"]) = (json!(all), json!([])));
+    assert!(held_out.contains("1 of its 9 images are held out"), "{held_out}");
+    let unposed = notes(&|v| drop(v["frames"].as_array_mut().unwrap().pop()));
+    assert!(unposed.contains("1 of the 9 images") && unposed.contains("no pose"), "{unposed}");
+}
+
+#[test]
 fn masks_that_are_missing_are_said() {
     let folder = tempfile::tempdir().unwrap();
     let capture = Capture::moving("frame_", 3, None);
@@ -169,4 +245,8 @@ fn masks_that_are_missing_are_said() {
     let scene = Scene::open(folder.path(), &options()).unwrap();
     let note = &scene.notes[0];
     assert!(note.contains("1 of the 3 images have no mask") && note.contains("frame_0001.png"), "{note}");
+    // A mask of another shape is refused.
+    image::GrayImage::new(SIZE.0, SIZE.1 / 2).save(folder.path().join("masks/1.png")).unwrap();
+    let message = Scene::open(folder.path(), &options()).unwrap_err().to_string();
+    assert!(message.contains("masks/1.png") && message.contains("97 x 37") && message.contains("97 x 74"), "{message}");
 }

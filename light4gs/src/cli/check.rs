@@ -1,0 +1,149 @@
+//! `check`, and what `train` says about its dataset.
+
+use std::path::{Path, PathBuf};
+
+use clap::Args;
+use clap::builder::PossibleValuesParser;
+use light4gs_data::{
+    CaptureSummary, ChangeCurve, DataError, Layouts, RgbImage8, Scene, change_curves, out_of_step, write_atomically,
+};
+use light4gs_report::capture_page;
+use light4gs_train::config::Config;
+use light4gs_train::dataset::{image_store, load_options};
+use light4gs_train::error::TrainError;
+use light4gs_train::table::{Align, Table};
+
+use super::output::{say, say_json, tell};
+
+/// Images that are decoded for the curves of change.
+const CURVE_IMAGES: usize = 240;
+/// Images of the contact sheet.
+const SHEET_IMAGES: usize = 24;
+/// Longer side of a picture on the contact sheet, pixels.
+const SHEET_SIDE: u32 = 192;
+
+#[derive(Debug, Args)]
+pub(super) struct Check {
+    /// Folder of the dataset.
+    scene: PathBuf,
+    /// Layout of the dataset; without it, it is found by content (see docs/data.md).
+    #[arg(long, value_name = "NAME", value_parser = PossibleValuesParser::new(Layouts::default().names()))]
+    format: Option<String>,
+    /// Changes one key of the configuration, such as data.times=order; may be given more than once.
+    #[arg(long = "set", value_name = "KEY=VALUE")]
+    overrides: Vec<String>,
+    /// Write a page with cameras and points from above, a contact sheet, and how much each camera's image changes.
+    #[arg(long, value_name = "FILE.html")]
+    html: Option<PathBuf>,
+    /// Print the result as JSON.
+    #[arg(long)]
+    json: bool,
+}
+
+impl Check {
+    pub(super) fn run(self) -> Result<(), TrainError> {
+        if let Some(page) = &self.html {
+            super::check_output(page, &self.scene)?;
+        }
+        let layouts = Layouts::default();
+        let layout = match &self.format {
+            Some(name) => layouts.by_name(name)?,
+            None => layouts.detect(&self.scene)?,
+        };
+        let mut overrides = self.overrides;
+        overrides.push(format!("data.layout={}", layout.name()));
+        let config = Config::load(Config::preset_of(layout)?, &overrides)?;
+        let scene = Scene::open(&self.scene, &load_options(&config))?;
+        let (capture, curves) = understand(&config, &scene, Curves::All)?;
+        if let Some(page) = &self.html {
+            let html = capture_page(&scene, &capture, &curves, &contact_sheet(&config, &scene)?)?;
+            write_atomically(page, |out| std::io::Write::write_all(out, html.as_bytes()))?;
+        }
+        if self.json {
+            say_json(&capture)?;
+        } else {
+            say(table(&capture))?;
+            capture.notes.iter().try_for_each(|note| say(format_args!("note: {note}")))?;
+            if let Some(page) = &self.html {
+                say(format_args!("page: {}", page.display()))?;
+            }
+        }
+        refuse_problems(&self.scene, &capture)
+    }
+}
+
+/// Which curves of change are made. Images are decoded for them.
+#[derive(Clone, Copy, PartialEq, Eq)]
+pub(super) enum Curves {
+    /// Those of several cameras, to compare them.
+    OfRigs,
+    /// Those of a single camera, too, to be looked at.
+    All,
+}
+
+/// What a dataset is taken for, with a note for each camera that is out of step, and the curves that show it.
+pub(super) fn understand(
+    config: &Config,
+    scene: &Scene,
+    wanted: Curves,
+) -> Result<(CaptureSummary, Vec<ChangeCurve>), TrainError> {
+    let mut capture = CaptureSummary::of(scene)?;
+    let single = scene.train.iter().all(|frame| frame.camera_id == scene.train[0].camera_id);
+    if single && wanted == Curves::OfRigs {
+        return Ok((capture, Vec::new()));
+    }
+    let curves = change_curves(scene, &image_store(config), CURVE_IMAGES)?;
+    for camera in out_of_step(&curves) {
+        let name = curves.iter().find(|curve| curve.camera_id == camera.camera_id).map_or("", |curve| &curve.name);
+        let (frames, way) =
+            (camera.frames_ahead.unsigned_abs(), if camera.frames_ahead > 0 { "ahead of" } else { "behind" });
+        capture.notes.push(format!(
+            "camera {name} is {frames} frames {way} the others: its images change as theirs do then (correlation {:.2}, {:.2} \
+             as they are); --set data.synchronize=true moves its times",
+            camera.correlation, camera.unshifted
+        ));
+    }
+    Ok((capture, curves))
+}
+
+/// Prints what a dataset is taken for: a table on a terminal, a line on a log.
+pub(super) fn tell_capture(capture: &CaptureSummary) {
+    if std::io::IsTerminal::is_terminal(&std::io::stderr()) {
+        tell(table(capture));
+    } else {
+        tell(format_args!("capture: {}", capture.line()));
+    }
+    for note in &capture.notes {
+        tell(format_args!("note: {note}"));
+    }
+}
+
+/// An error where training could only fail.
+pub(super) fn refuse_problems(scene: &Path, capture: &CaptureSummary) -> Result<(), TrainError> {
+    if capture.problems.is_empty() {
+        return Ok(());
+    }
+    Err(TrainError::Input(format!("{}: {}", scene.display(), capture.problems.join("; "))))
+}
+
+fn table(capture: &CaptureSummary) -> Table {
+    let mut table = Table::new([("capture", Align::Left), ("understood as", Align::Left)]);
+    for fact in &capture.facts {
+        table.row([&fact.what, &fact.found]);
+    }
+    table
+}
+
+/// Small images, evenly chosen, in order of time.
+fn contact_sheet(config: &Config, scene: &Scene) -> Result<Vec<(String, RgbImage8)>, DataError> {
+    let store = image_store(config);
+    let mut frames: Vec<_> = scene.train.iter().chain(&scene.test).filter(|frame| frame.has_image()).collect();
+    frames.sort_by(|a, b| a.time.total_cmp(&b.time).then(a.camera_id.cmp(&b.camera_id)));
+    let chosen = frames.iter().step_by(frames.len().div_ceil(SHEET_IMAGES).max(1));
+    let small = |frame: &&&light4gs_data::Frame| {
+        let image = store.get(frame)?;
+        let factor = image.width.max(image.height).div_ceil(SHEET_SIDE).clamp(1, image.width.min(image.height).max(1));
+        Ok((format!("{}, time {:.3}", frame.name, frame.time), image.reduced(factor)))
+    };
+    chosen.map(|frame| small(&frame)).collect()
+}
