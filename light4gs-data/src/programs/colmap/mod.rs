@@ -150,7 +150,8 @@ impl Colmap {
 /// What to do where a stage fails.
 const AGAIN: &str = "remove the folder `work` in the output and try again";
 /// What to do where no poses are found.
-pub(crate) const FILM_AGAIN: &str = "film again: move sideways, slowly, past something with texture (see docs/data.md)";
+pub(crate) const FILM_AGAIN: &str = "film again: move sideways, slowly, past something with texture; a camera that only turns \
+                                     sees no depth (docs/data.md)";
 
 /// The two numbers of `... [3/20]`, as COLMAP counts images.
 fn counted(line: &str) -> Option<(usize, usize)> {

@@ -91,7 +91,9 @@ pub(super) fn poses(job: &Job, sparse: &Path, mapper: Mapper, done: &mut dyn FnM
     command.arg("--output_path").arg(sparse);
     let begun = Instant::now();
     let (mut most, mut since) = (0, begun);
+    let mut none = false;
     let mut line = |line: Option<&str>| {
+        none |= line.is_some_and(|line| line.contains("failed to create sparse model"));
         if let Some(count) = line.and_then(registered)
             && count > most
         {
@@ -101,5 +103,7 @@ pub(super) fn poses(job: &Job, sparse: &Path, mapper: Mapper, done: &mut dyn FnM
         let stuck = !global && since.elapsed() > PATIENCE.max(begun.elapsed() / 3);
         if stuck { Heard::Stop } else { Heard::Quote }
     };
-    COLMAP.stream(&mut command, &mut line, "finding poses", FILM_AGAIN).map(drop)
+    let ended = COLMAP.stream(&mut command, &mut line, "finding poses", FILM_AGAIN);
+    // That there is no model is a result, and not a failure.
+    if none { Ok(()) } else { ended.map(drop) }
 }
