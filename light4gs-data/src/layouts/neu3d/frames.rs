@@ -100,7 +100,7 @@ fn of_one_size(list: Vec<PathBuf>, camera: &CameraFrames, notes: &mut Vec<String
     let Some((usual, _)) = counts.into_iter().max_by_key(|(size, count)| (*count, *size)) else { return Ok(list) };
     let most = (STRAYS * list.len() as f64).max(1.0) as usize;
     let strays: Vec<usize> = (0..list.len()).filter(|i| headers[*i].size != usual).collect();
-    let Some(first) = strays.first() else { return without_strays(list, most, notes) };
+    let Some(first) = strays.first() else { return Ok(without_strays(list, most, notes)) };
     let size = |(width, height): (u32, u32)| format!("{width} x {height}");
     let (found, expected) = (size(headers[*first].size), size(usual));
     if strays.len() > most || list.len() < 3 {
@@ -119,17 +119,17 @@ fn of_one_size(list: Vec<PathBuf>, camera: &CameraFrames, notes: &mut Vec<String
         list[*first].display()
     ));
     let kept = list.into_iter().enumerate().filter(|(i, _)| !strays.contains(i)).map(|(_, path)| path);
-    without_strays(kept.collect(), most, notes)
+    Ok(without_strays(kept.collect(), most, notes))
 }
 
 /// The pictures without the few that have no number, where the others have one.
-fn without_strays(list: Vec<PathBuf>, most: usize, notes: &mut Vec<String>) -> Result<Vec<PathBuf>, DataError> {
+fn without_strays(list: Vec<PathBuf>, most: usize, notes: &mut Vec<String>) -> Vec<PathBuf> {
     let numbered = |path: &PathBuf| number_of(&stem_of(path)).is_some();
     let strays: Vec<&PathBuf> = list.iter().filter(|path| !numbered(path)).collect();
-    let Some(first) = strays.first().filter(|_| strays.len() <= most && list.len() > 2) else { return Ok(list) };
+    let Some(first) = strays.first().filter(|_| strays.len() <= most && list.len() > 2) else { return list };
     let (count, name) = (strays.len(), first.display());
     notes.push(format!("{count} of {} pictures left out: {name} has no number, as the others have", list.len()));
-    Ok(list.into_iter().filter(numbered).collect())
+    list.into_iter().filter(numbered).collect()
 }
 
 /// The number in a name is the frame's, so that a missing frame does not shift those after it.
