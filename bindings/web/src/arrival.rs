@@ -3,14 +3,21 @@
 use light4gs_codec::{CodecError, SceneData, SectionInfo, StreamDecoder};
 
 use crate::description::Facts;
+use crate::limits::limits;
 use crate::scene::OpenScene;
 
 /// A file whose bytes are coming.
-#[derive(Debug, Default)]
+#[derive(Debug)]
 pub struct Arrival {
     decoder: StreamDecoder,
     /// Layers of Gaussians that were shown.
     shown: usize,
+}
+
+impl Default for Arrival {
+    fn default() -> Self {
+        Self { decoder: StreamDecoder::with_limits(&limits()), shown: 0 }
+    }
 }
 
 impl Arrival {

@@ -52,6 +52,7 @@
 //! | `levels.rs` | levels of detail: fewer, larger Gaussians that stand for those of a scene |
 //! | `gaussians.rs` | activations, and the values for the vertex shader |
 //! | `draw_list.rs` | the list for drawing, back to front, with colors |
+//! | `limits.rs` | the files that the player takes |
 //! | `description.rs` | the contents of a file for the player's panel, as JSON |
 //! | `digest.rs` | one number for all bits of a decoded scene |
 //! | `abi.rs` | the functions that JavaScript calls |
@@ -63,6 +64,7 @@ mod digest;
 mod draw_list;
 mod gaussians;
 mod levels;
+mod limits;
 #[cfg(not(target_os = "unknown"))]
 pub mod page;
 mod scene;
@@ -70,4 +72,5 @@ mod scene;
 pub use arrival::Arrival;
 pub use digest::digest;
 pub use draw_list::{ENTRY, ROW, Viewpoint};
+pub use limits::{MOST_BYTES, limits};
 pub use scene::OpenScene;

@@ -162,6 +162,26 @@ describe("images", () => {
     });
   }
 
+  test("with a principal point outside of the image it is a part of a wider one", async () => {
+    const page = await libraryPage();
+    const whole = camera("near");
+    const [size, width] = [whole.width, 5 * whole.width];
+    // Turned, so that what was in the middle stands at the left of the wider image.
+    const angle = Math.atan2(size / 2 - width / 2, whole.fx);
+    const [cos, sin] = [Math.cos(angle), Math.sin(angle)];
+    const turned = (x, y, z) => [cos * x + sin * z, y, cos * z - sin * x];
+    const [right, down, forward] = [0, 3, 6].map((row) => whole.rotation.slice(row, row + 3));
+    const axis = (k) => turned(right[k], down[k], forward[k]);
+    const rotation = [0, 1, 2].flatMap((row) => [0, 1, 2].map((k) => axis(k)[row]));
+    const part = { ...whole, rotation, translation: turned(...whole.translation), cx: width / 2 };
+    const wide = await pixelsAt(page, 0.5, { ...part, width });
+    const rows = Array.from({ length: size }, (_, row) => wide.slice(4 * row * width, 4 * (row * width + size)));
+    const distance = psnr(await pixelsAt(page, 0.5, part), { width: size, height: size, channels: 4, pixels: rows.flat() });
+    console.log(`  principal point at 2.5 widths: ${distance.toFixed(1)} dB`);
+    assert.ok(distance >= 50, `${distance} dB`);
+    await page.context().close();
+  });
+
   test("without half floats the images are still close", async () => {
     const page = await libraryPage();
     await page.evaluate(() => (globalThis.player.renderer.halfFloats = false));
@@ -691,7 +711,9 @@ describe("the element", () => {
     before = await scene();
     watched.broken = true;
     watched.version++;
-    await page.locator("l4gs-player").getByRole("alert").filter({ hasText: "cannot be loaded" }).waitFor();
+    // Until the next scene has come, the one before stays.
+    await page.locator("l4gs-player").getByRole("status").filter({ hasText: "cannot be loaded" }).waitFor();
+    assert.deepEqual(await facts(), wanted);
     watched.broken = false;
     await next(before);
     assert.deepEqual(await facts(), wanted);

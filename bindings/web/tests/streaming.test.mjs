@@ -68,6 +68,40 @@ const throttled = (bytes, { breaksAfter = Infinity, ranges = true } = {}) => (re
   response.on("close", () => clearInterval(timer));
 };
 
+/**
+ * Answers whole files, or ranges of them. The first answer is cut right behind some of its bytes, before the browser has looked at any. Where
+ * it has no length, nothing but the cut says that it has ended.
+ */
+const cut = (bytes, { after, length = true }) => (response, request) => {
+  const [, first] = /^bytes=(\d+)-$/.exec(request.headers.range ?? "") ?? [];
+  const begin = Number(first ?? 0);
+  const again = requests.length > 0;
+  const status = begin >= bytes.length ? 416 : first ? 206 : 200;
+  requests.push({ range: request.headers.range, status });
+  response.writeHead(status, {
+    "content-type": "application/octet-stream", etag: '"one"', "accept-ranges": "bytes",
+    ...(length && { "content-length": Math.max(bytes.length - begin, 0) }),
+  });
+  if (again) return response.end(status === 416 ? "" : bytes.subarray(begin));
+  response.write(bytes.subarray(0, after), () => response.socket.resetAndDestroy());
+};
+
+/** Promises a stream of this length, and gives zeros behind the head for as long as somebody takes them. */
+const endless = (head, length) => (response, request) => {
+  const noted = { range: request.headers.range, status: 200, given: 0 };
+  requests.push(noted);
+  const promise = Buffer.from(head);
+  promise.writeBigUInt64LE(length, 20);
+  response.writeHead(200, { "content-type": "application/octet-stream" });
+  response.write(promise);
+  const zeros = Buffer.alloc(1 << 16);
+  const give = () => {
+    while (!response.destroyed && response.write(zeros)) noted.given += zeros.length;
+  };
+  response.on("drain", give);
+  give();
+};
+
 const camera = orbitCamera({ radius: 3, elevation: 10, width: 300, height: 300, fovX: 0.6911112 });
 
 before(async () => {
@@ -84,6 +118,10 @@ before(async () => {
     "breaks.l4gs": throttled(file, { breaksAfter: 1_500_000 }),
     "breaks-for-good.l4gs": throttled(file, { breaksAfter: 1_500_000, ranges: false }),
     "damaged.l4gs": throttled(damaged),
+    "cut-at-once.l4gs": cut(file, { after: 100_000 }),
+    "cut-at-the-end.l4gs": cut(file, { after: file.length }),
+    "cut-without-length.l4gs": cut(file, { after: file.length, length: false }),
+    "endless.l4gs": endless(file.subarray(0, 32), 1n << 36n),
   });
 });
 
@@ -191,6 +229,55 @@ test("a connection that breaks is resumed where it broke", async () => {
   assert.deepEqual(requests.map(({ status }) => status), [200, 206]);
   const resumed = Number(/^bytes=(\d+)-$/.exec(requests[1].range)[1]);
   assert.ok(resumed > 0 && resumed <= requests[0].given, `${resumed} of ${requests[0].given}`);
+  await page.context().close();
+});
+
+test("a connection that is cut right behind the data is resumed, and one that is cut at the end is whole", async () => {
+  for (const address of ["/cut-at-once.l4gs", "/cut-at-the-end.l4gs", "/cut-without-length.l4gs"]) {
+    const page = await libraryPage();
+    const { first, last, counts } = await page.evaluate((address) => globalThis.show(address), address);
+    assert.deepEqual([first.error, last.error, counts.at(-1)], [undefined, undefined, GAUSSIANS], `${address}: ${JSON.stringify(requests)}`);
+    assert.ok(requests.length <= 2, JSON.stringify(requests));
+    await page.context().close();
+  }
+});
+
+test("a length that the worker cannot hold is refused by the head alone", async () => {
+  const page = await libraryPage();
+  const { first } = await page.evaluate(() => globalThis.show("/endless.l4gs"));
+  assert.equal(first.error, "too-large");
+  assert.ok(requests[0].given < 64e6, `${requests[0].given} bytes`);
+  assert.match(await page.evaluate(() => globalThis.element.find("message").textContent), /larger than the player accepts/);
+  const file = await page.evaluate(async () => {
+    // A file that takes no memory itself.
+    const large = new File(Array(9).fill(new Blob([new Uint8Array(2 ** 26)])), "large.l4gs");
+    const element = document.createElement("l4gs-player");
+    element.toggleAttribute("page");
+    document.body.append(element);
+    const failed = new Promise((resolve) => element.addEventListener("error", (event) => resolve(event.detail.kind)));
+    const transfer = new DataTransfer();
+    transfer.items.add(large);
+    element.find("file").files = transfer.files;
+    element.find("file").dispatchEvent(new Event("change"));
+    return failed;
+  });
+  assert.equal(file, "too-large");
+  await page.context().close();
+});
+
+test("a scene stays where the next one is none", async () => {
+  const page = await libraryPage();
+  await page.evaluate(() => globalThis.show("/at-once.l4gs"));
+  const kept = await page.evaluate(async () => {
+    const { element } = globalThis;
+    const before = element.player;
+    await element.open(new TextEncoder().encode("no scene"), { keep: true });
+    const said = element.find("status").textContent;
+    const same = element.player === before && element.find("message").hidden;
+    await element.load("/nothing.l4gs", null, { keep: true });
+    return { same, still: element.player === before, said, drawn: (await before.renderAt(0.5, before.view)).some((value) => value > 0) };
+  });
+  assert.deepEqual(kept, { same: true, still: true, said: "This is not a .l4gs scene.", drawn: true });
   await page.context().close();
 });
 

@@ -66,6 +66,9 @@ test("the synthetic scene is trained, shown, and can be kept", { timeout: 900_00
   });
   assert.ok(shown.count > 100 && shown.moves, JSON.stringify(shown));
   assert.equal(shown.picture[0], 2 * shown.picture[1]);
+  // The report is a page of its own, under the policy of this one.
+  const [report] = await Promise.all([page.context().waitForEvent("page"), page.click("#report")]);
+  await report.waitForFunction(() => document.querySelector("l4gs-player")?.player?.scene.count > 100);
   assert.ok(await page.evaluate(() => document.querySelector("#curve polyline").getAttribute("points").split(" ").length) >= 4);
   assert.deepEqual(page.problems, []);
   await page.context().close();

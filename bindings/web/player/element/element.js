@@ -4,11 +4,12 @@ import { readCameras } from "../views/camera.js";
 import { fillCameras } from "./camera_list.js";
 import { SceneError } from "../errors.js";
 import { Layers } from "./layers.js";
+import { explain } from "./messages.js";
 import { icon, LAYOUT } from "./layout.js";
 import { fillPanel } from "./panel.js";
 import { Player } from "../player.js";
 import { Scene, dismiss, load, prepare } from "../scene/scene.js";
-import { bytesOf, download, pieces } from "./sources.js";
+import { MOST_TEXT, bytesOf, checkLength, download, pieces } from "./sources.js";
 import { watch } from "./watch.js";
 
 /** @typedef {import("../views/camera.js").DatasetCamera} DatasetCamera */
@@ -127,14 +128,14 @@ export class L4gsPlayer extends (globalThis.HTMLElement ?? class {}) {
       else this.layers.progress("Loading", share);
     };
     try {
-      const list = cameras ? download(cameras, signal).then((bytes) => readCameras(new TextDecoder().decode(bytes), cameras)) : Promise.resolve([]);
+      const list = cameras ? download(cameras, signal, MOST_TEXT).then((bytes) => readCameras(new TextDecoder().decode(bytes), cameras)) : Promise.resolve([]);
       if (keep) {
         const [bytes, known] = await Promise.all([download(address, signal), list]);
         if (loading === this.#loading) await this.open(bytes, { cameras: known, keep });
         return true;
       }
       report(0);
-      const coming = load(pieces(address, signal, report));
+      const coming = load(pieces(address, signal, { report }));
       // Without its cameras the scene is not shown.
       list.catch(() => coming.then((unwanted) => unwanted.close(), () => {}));
       const [loaded, known] = await Promise.all([coming, list]);
@@ -162,7 +163,8 @@ export class L4gsPlayer extends (globalThis.HTMLElement ?? class {}) {
       // The rest of the file is not reported any more.
       if (loading === this.#loading) {
         this.#loading++;
-        this.#fail(error);
+        if (keep && this.player) this.#say(explain(error).title);
+        else this.#fail(error);
       }
       return false;
     }
@@ -203,6 +205,11 @@ export class L4gsPlayer extends (globalThis.HTMLElement ?? class {}) {
       if (!this.find("camera").value) this.#showCamera();
     } catch (error) {
       if (loading !== this.#loading) return scene?.close();
+      // A scene that is kept is worth more than one that cannot be shown.
+      if (before && before === this.player) {
+        scene?.close();
+        return this.#say(explain(error).title);
+      }
       this.#end();
       scene?.close();
       this.#fail(error);
@@ -425,10 +432,12 @@ export class L4gsPlayer extends (globalThis.HTMLElement ?? class {}) {
     const loading = ++this.#loading;
     this.layers.progress("Reading");
     try {
+      checkLength(file.name, file.size);
       const bytes = await file.arrayBuffer();
       if (loading === this.#loading) await this.open(bytes);
     } catch (error) {
-      if (loading === this.#loading) this.#fail(new SceneError("network", `${file.name}: ${error instanceof Error ? error.message : error}`));
+      if (loading !== this.#loading) return;
+      this.#fail(error instanceof SceneError ? error : new SceneError("network", `${file.name}: ${error instanceof Error ? error.message : error}`));
     }
   }
 

@@ -6,6 +6,19 @@ import { SceneError } from "../errors.js";
 const RESUMES = 3;
 /** Milliseconds before that. */
 const PAUSE = 300;
+/** Bytes of the longest file that the decoder takes, as in src/limits.rs. */
+export const MOST_BYTES = 2 ** 29;
+/** Bytes of the longest text: the cameras of a scene, or what a page watches. */
+export const MOST_TEXT = 2 ** 26;
+
+/**
+ * Refuses a file before it is in memory.
+ * @param {string} name @param {number} bytes  NaN where that is not known @param {number} [most]
+ * @throws {SceneError} `too-large`
+ */
+export function checkLength(name, bytes, most = MOST_BYTES) {
+  if (bytes > most) throw new SceneError("too-large", `${name}: ${bytes} bytes, at most ${most} are accepted`);
+}
 
 /**
  * @param {ReadableStreamDefaultReader<Uint8Array<ArrayBuffer>>} reader
@@ -26,37 +39,53 @@ async function* read(reader, report) {
 }
 
 /**
- * The bytes at an address as they come. Where the connection breaks and the server gives ranges, the rest is asked for.
+ * The bytes at an address as they come. Where the connection breaks and the server gives ranges, the rest is asked for; where nothing
+ * has come yet, all of it. (Of a connection that is cut right behind the data, a browser may give none of them.)
  * @param {string} address
  * @param {AbortSignal} signal
- * @param {(share: number) => void} [report]  told how much has come, in [0, 1]; NaN where that is not known
+ * @param {{ report?: (share: number) => void, most?: number }} [options]  `report` is told how much has come, in [0, 1]; NaN where that is not
+ *   known. `most` bytes are accepted
  * @returns {AsyncGenerator<Uint8Array<ArrayBuffer>>}
- * @throws {SceneError} `network`
+ * @throws {SceneError} `network`, `too-large`
  */
-export async function* pieces(address, signal, report = () => {}) {
+export async function* pieces(address, signal, { report = () => {}, most = MOST_BYTES } = {}) {
   let received = 0;
   let total = NaN;
   /** The file's tag. While it stays the same, so does the file. */
   let tag = "";
+  /** Whether the server gives the rest of this file. */
+  let resumable = false;
+  /** Whether the file has begun to come. */
+  let begun = false;
   for (let resumes = 0; ; resumes++) {
     try {
       /** @type {Record<string, string>} */
       const headers = received > 0 ? { range: `bytes=${received}-`, ...(tag && { "if-range": tag }) } : {};
       const response = await fetch(address, { cache: "no-cache", signal, headers });
+      // There is nothing behind what has come.
+      if (received > 0 && response.status === 416) return;
       if (!response.ok || !response.body) throw new Error(`HTTP ${response.status} ${response.statusText}`);
       if (received > 0 && response.status !== 206) throw new Error(`the connection broke after ${received} bytes`);
+      begun = true;
       if (received === 0) {
         total = Number(response.headers.get("content-length")) || NaN;
+        checkLength(address, total, most);
         tag = response.headers.get("etag") ?? "";
         // A weak tag may be that of other bytes, and ranges of compressed bytes are others.
-        const resumable = response.headers.get("accept-ranges") === "bytes" && !response.headers.has("content-encoding");
-        if (!resumable || tag.startsWith("W/")) resumes = RESUMES;
+        resumable = response.headers.get("accept-ranges") === "bytes" && !response.headers.has("content-encoding") && !tag.startsWith("W/");
       }
-      yield* read(response.body.getReader(), (bytes) => report(Math.min((received += bytes) / total, 1)));
+      const count = (/** @type {number} */ bytes) => {
+        received += bytes;
+        checkLength(address, received, most);
+        report(Math.min(received / total, 1));
+      };
+      yield* read(response.body.getReader(), count);
       return;
     } catch (error) {
-      // The connection may also end halfway.
-      if (signal.aborted || received === 0 || resumes >= RESUMES) {
+      if (error instanceof SceneError) throw error;
+      // All of it has come, only its end was not said.
+      if (received > 0 && received === total) return;
+      if (signal.aborted || !begun || resumes >= RESUMES || (received > 0 && !resumable)) {
         throw new SceneError("network", `${address}: ${error instanceof Error ? error.message : error}`);
       }
       await new Promise((resolve) => setTimeout(resolve, PAUSE));
@@ -68,13 +97,13 @@ export async function* pieces(address, signal, report = () => {}) {
  * All bytes at an address.
  * @param {string} address
  * @param {AbortSignal} signal
- * @param {(share: number) => void} [report]  as of {@link pieces}
+ * @param {number} [most]  bytes that are accepted
  * @returns {Promise<Uint8Array>}
- * @throws {SceneError} `network`
+ * @throws {SceneError} `network`, `too-large`
  */
-export async function download(address, signal, report) {
+export async function download(address, signal, most) {
   const parts = [];
-  for await (const piece of pieces(address, signal, report)) parts.push(piece);
+  for await (const piece of pieces(address, signal, { most })) parts.push(piece);
   return new Uint8Array(await new Blob(parts).arrayBuffer());
 }
 

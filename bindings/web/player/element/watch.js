@@ -1,5 +1,7 @@
 // Looks at a small text again and again: how a page follows a scene that is still being trained.
 
+import { MOST_TEXT, download } from "./sources.js";
+
 /** Milliseconds between two looks. */
 const INTERVAL = 1500;
 
@@ -14,7 +16,7 @@ export async function watch(address, signal, say, load) {
   let shown = "";
   while (!signal.aborted) {
     try {
-      const text = await (await fetch(address, { cache: "no-store", signal })).text();
+      const text = new TextDecoder().decode(await download(address, signal, MOST_TEXT));
       if (signal.aborted) return;
       const { status, scene } = JSON.parse(text);
       say(status ?? "");

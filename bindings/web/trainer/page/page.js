@@ -126,6 +126,7 @@ function take(message) {
   }
 }
 
+find("wishes").addEventListener("submit", (/** @type {Event} */ event) => event.preventDefault());
 find("train").addEventListener("click", start);
 find("stop").addEventListener("click", () => {
   end();
