@@ -1,23 +1,29 @@
 //! Reading whole files from others: regular files only, up to a size.
 
-use std::fs::{self, File};
+use std::fs::{self, File, Metadata};
 use std::io::{self, Read};
 use std::path::Path;
 
 /// Opens a file to read it.
 ///
 /// A pipe, a device or a folder is refused before it is opened: opening a pipe would wait for its writer, and a device
-/// may never end.
+/// may never end. It is looked at once more when it is open, since it may be another file by then.
 ///
 /// # Errors
 /// As the system says; [`io::ErrorKind::InvalidInput`] for anything but a regular file.
 pub fn open_regular_file(path: &Path) -> io::Result<File> {
-    let kind = fs::metadata(path)?.file_type();
-    if !kind.is_file() {
-        let what = if kind.is_dir() { "a folder" } else { "a pipe, a socket or a device" };
-        return Err(io::Error::new(io::ErrorKind::InvalidInput, format!("it is {what}, expected a regular file")));
+    only_regular(&fs::metadata(path)?)?;
+    let file = File::open(path)?;
+    only_regular(&file.metadata()?)?;
+    Ok(file)
+}
+
+fn only_regular(found: &Metadata) -> io::Result<()> {
+    if found.is_file() {
+        return Ok(());
     }
-    File::open(path)
+    let what = if found.is_dir() { "a folder" } else { "a pipe, a socket or a device" };
+    Err(io::Error::new(io::ErrorKind::InvalidInput, format!("it is {what}, expected a regular file")))
 }
 
 /// Reads a file of at most `limit` bytes, opened as [`open_regular_file`] does.
@@ -25,11 +31,16 @@ pub fn open_regular_file(path: &Path) -> io::Result<File> {
 /// # Errors
 /// As [`open_regular_file`]; [`io::ErrorKind::FileTooLarge`] for a file that is longer than `limit`.
 pub fn read_regular_file(path: &Path, limit: u64) -> io::Result<Vec<u8>> {
+    let file = open_regular_file(path)?;
+    let too_large = |length: u64| {
+        let problem = || io::Error::new(io::ErrorKind::FileTooLarge, format!("it is longer than {limit} bytes"));
+        if length > limit { Err(problem()) } else { Ok(()) }
+    };
+    // Before memory is taken; and once more, since it may grow.
+    too_large(file.metadata()?.len())?;
     let mut bytes = Vec::new();
-    open_regular_file(path)?.take(limit.saturating_add(1)).read_to_end(&mut bytes)?;
-    if bytes.len() as u64 > limit {
-        return Err(io::Error::new(io::ErrorKind::FileTooLarge, format!("it is longer than {limit} bytes")));
-    }
+    file.take(limit.saturating_add(1)).read_to_end(&mut bytes)?;
+    too_large(bytes.len() as u64)?;
     Ok(bytes)
 }
 

@@ -8,6 +8,7 @@ use zip::write::FileOptions;
 
 use crate::atomic::write_atomically;
 use crate::error::DataError;
+use crate::numbered::NumberedFiles;
 use crate::ply::GaussianPly;
 
 /// Writes the Gaussians of successive times. Entries are stored as they are, since float32 hardly gets smaller and a browser
@@ -15,8 +16,9 @@ use crate::ply::GaussianPly;
 ///
 /// # Errors
 /// As [`GaussianPly::write`].
-pub fn write_ply_zip(path: &Path, times: impl Iterator<Item = GaussianPly>) -> Result<(), DataError> {
+pub fn write_ply_zip(path: &Path, times: impl ExactSizeIterator<Item = GaussianPly>) -> Result<(), DataError> {
     let mut refused = None;
+    let files = NumberedFiles::new(times.len(), "ply");
     let written = write_atomically(path, |file| {
         let mut archive = ZipWriter::new(file);
         let options = FileOptions::default().compression_method(zip::CompressionMethod::Stored);
@@ -25,7 +27,7 @@ pub fn write_ply_zip(path: &Path, times: impl Iterator<Item = GaussianPly>) -> R
                 refused = Some(problem);
                 io::Error::other("a PLY file was refused")
             })?;
-            archive.start_file(format!("{k:04}.ply"), options)?;
+            archive.start_file(files.name(k), options)?;
             archive.write_all(&bytes)?;
         }
         archive.finish()?;

@@ -2,7 +2,10 @@
 
 use std::path::Path;
 
-use light4gs_data::DataError;
+use light4gs_data::{DataError, read_regular_text};
+
+/// More than the arguments of a training take.
+const MAX_BYTES: u64 = 1 << 20;
 
 /// The arguments that are used.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -34,7 +37,7 @@ impl Default for Settings {
 impl Settings {
     /// Reads the file; arguments that it does not mention keep their defaults.
     pub(super) fn read(path: &Path) -> Result<Self, DataError> {
-        let text = std::fs::read_to_string(path).map_err(DataError::io("read", path))?;
+        let text = read_regular_text(path, MAX_BYTES).map_err(DataError::io("read", path))?;
         let mut settings = Self::default();
         for (name, value) in [
             ("no_dx", &mut settings.no_dx),

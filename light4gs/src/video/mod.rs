@@ -10,8 +10,7 @@ use std::path::{Path, PathBuf};
 
 use image::codecs::gif::{GifEncoder, Repeat};
 use image::{Delay, RgbaImage};
-use light4gs_data::write_atomically;
-use light4gs_data::{DataError, RgbImage8};
+use light4gs_data::{DataError, NumberedFiles, RgbImage8, write_atomically};
 
 pub(crate) use mp4::write_mp4;
 
@@ -72,17 +71,18 @@ pub(crate) fn write_gif<E: From<DataError>>(
 /// Writes frames as `0000.png`, `0001.png`... into `folder`, which is made if it does not exist. Returns the files.
 ///
 /// # Errors
-/// The first error of `frames`, or [`DataError`] naming the file that cannot be written. Each file is whole or absent;
+/// A folder with numbered files that these do not replace ([`NumberedFiles::open_folder`]). The first error of `frames`, or [`DataError`] naming the file that cannot be written. Each file is whole or absent;
 /// those before it stay.
 pub(crate) fn write_png_sequence<E: From<DataError>>(
     folder: &Path,
-    frames: impl IntoIterator<Item = Result<RgbImage8, E>>,
+    frames: impl IntoIterator<Item = Result<RgbImage8, E>, IntoIter: ExactSizeIterator>,
 ) -> Result<Vec<PathBuf>, E> {
-    std::fs::create_dir_all(folder)
-        .map_err(|source| E::from(DataError::Io { action: "create", path: folder.to_path_buf(), source }))?;
+    let frames = frames.into_iter();
+    let names = NumberedFiles::new(frames.len(), "png");
+    names.open_folder(folder)?;
     let mut files = Vec::new();
-    for (number, frame) in frames.into_iter().enumerate() {
-        let path = folder.join(format!("{number:04}.png"));
+    for (number, frame) in frames.enumerate() {
+        let path = folder.join(names.name(number));
         frame?.save_png(&path).map_err(E::from)?;
         files.push(path);
     }

@@ -11,7 +11,7 @@ use std::time::Instant;
 
 use burn::tensor::{Device, Distribution, Tensor, TensorData};
 use glam::{Mat3, Quat, Vec3};
-use light4gs_data::{Camera, DataError};
+use light4gs_data::{Camera, DataError, read_regular_file};
 use light4gs_model::ops::skinning::{SkinningInputs, skin};
 use light4gs_model::{DeformationConfig, GaussianTensors, Gaussians, HexPlaneConfig, ReadBacks, Splatter};
 use light4gs_train::config::DeviceName;
@@ -81,8 +81,7 @@ impl BenchScene {
     /// # Errors
     /// [`TrainError::Data`] for a file that cannot be read, or with the tensor that is missing or has another type or shape.
     pub fn open(path: &Path) -> Result<Self, TrainError> {
-        let bytes =
-            std::fs::read(path).map_err(|source| DataError::Io { action: "read", path: path.to_owned(), source })?;
+        let bytes = read_regular_file(path, u64::MAX).map_err(DataError::io("read", path))?;
         let field = |field: &str, problem: String| DataError::Field {
             path: path.to_owned(),
             field: field.to_owned(),

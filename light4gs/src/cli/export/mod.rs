@@ -7,9 +7,9 @@ use std::ops::RangeInclusive;
 use std::path::{Path, PathBuf};
 
 use clap::Args;
-use light4gs_codec::{GaussianArrays, Limits, SceneMeta, info, read_file_and};
+use light4gs_codec::{GaussianArrays, SceneMeta, StreamInfo, read_stream};
 use light4gs_data::{
-    DataError, GaussianPly, GlbOptions, MotionSample, write_atomically, write_four_dgs, write_glb, write_ply_zip,
+    GaussianPly, GlbOptions, MotionSample, NumberedFiles, write_atomically, write_four_dgs, write_glb, write_ply_zip,
 };
 use light4gs_model::{BuiltInField, STILLNESS};
 use light4gs_train::config::DeviceName;
@@ -35,13 +35,13 @@ pub(super) struct Export {
     /// The .l4gs file.
     file: PathBuf,
     /// A folder for `0000.ply`, `0001.ply`, ... (a name without a suffix or with a slash at its end, or an existing
-    /// folder), or a file: a single time as .ply or .glb (KHR_gaussian_splatting), the whole motion as .4dgs, or as a .zip
+    /// folder; numbered PLY files of another sequence must not be there), or a file: a single time as .ply or .glb (KHR_gaussian_splatting), the whole motion as .4dgs, or as a .zip
     /// with the same PLY files as the folder. A scene of control nodes becomes a .glb with its whole motion (skin and
     /// animation), unless --time asks for a single time.
     #[arg(long, required_unless_present = "html")]
     out: Option<PathBuf>,
     /// One file that plays the scene in a browser without any other file.
-    #[arg(long, value_name = "FILE", conflicts_with_all = ["out", "frames", "device", "time", "fps", "z_up"])]
+    #[arg(long, value_name = "FILE", conflicts_with_all = ["out", "frames", "device", "time", "fps", "z_up", "limits"])]
     html: Option<PathBuf>,
     /// Dataset whose cameras the page offers; by default that of the run whose folder holds the file.
     #[arg(long, requires = "html")]
@@ -110,8 +110,8 @@ impl Export {
 
     fn write_page(&self, html: &Path) -> Result<(), TrainError> {
         check_output(html, &self.file)?;
-        let limits = Limits::default();
-        let (name, scene) = read_file_and(&self.file, &limits, |bytes| Ok((info(bytes)?.meta.name, bytes.to_vec())))?;
+        let (scene, StreamInfo { meta: SceneMeta { name, .. }, .. }) =
+            read_stream(&self.file, &light4gs_web::limits())?;
         let cameras = dataset_cameras(&self.file, self.scene.as_deref(), MOST_CAMERAS)?;
         let title = if name.is_empty() { "Scene" } else { &name };
         let page = page(title, Content::Embedded { scene: &scene, cameras: &cameras }, None);
@@ -135,9 +135,10 @@ impl Export {
         let single_time = self.time.unwrap_or(0.0);
         match target {
             Target::PlySequence => {
-                std::fs::create_dir_all(path).map_err(DataError::io("create", path))?;
+                let names = NumberedFiles::new(frames as usize, "ply");
+                names.open_folder(path)?;
                 for (k, time) in times().enumerate() {
-                    at(time).write(&path.join(format!("{k:04}.ply")))?;
+                    at(time).write(&path.join(names.name(k)))?;
                 }
                 say(format_args!("wrote {frames} PLY files to {out}"))
             }
@@ -184,10 +185,13 @@ impl Export {
     fn fps(&self, meta: &SceneMeta) -> Result<f64, TrainError> {
         let source = Some(meta.fps).filter(|fps| *fps > 0.0);
         let fps = f64::from(self.fps.or(source).unwrap_or(30.0));
-        if FPS.contains(&fps) {
-            Ok(fps)
-        } else {
-            Err(TrainError::Input(format!("--fps must be {} to {}, not {fps}", FPS.start(), FPS.end())))
+        let (least, most) = (FPS.start(), FPS.end());
+        match self.fps {
+            _ if FPS.contains(&fps) => Ok(fps),
+            Some(fps) => Err(TrainError::Input(format!("--fps must be {least} to {most}, not {fps}"))),
+            None => Err(TrainError::Input(format!(
+                "the file says that it has {fps} frames a second, expected {least} to {most}; give a number with --fps"
+            ))),
         }
     }
 }

@@ -1,11 +1,12 @@
 //! `view`.
 
+mod connections;
+mod request;
 mod server;
 
-use std::borrow::Cow;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
-use std::sync::{Mutex, PoisonError};
+use std::sync::{Arc, Mutex, PoisonError, TryLockError};
 
 use clap::Args;
 use light4gs_data::{DataError, Scene, read_regular_file};
@@ -14,11 +15,11 @@ use light4gs_train::config::{Config, DeviceName};
 use light4gs_train::dataset::load_options;
 use light4gs_train::error::TrainError;
 use light4gs_train::run::RunFolder;
-use light4gs_train::view_source::ViewSource;
+use light4gs_train::view_source::{Shown, ViewSource};
 use light4gs_web::page::{Content, PLAYER, TRAINER, TRAINER_PAGE, page};
 use serde_json::json;
 
-use self::server::{Answer, Server};
+use self::server::{Answer, Body, Server};
 use super::output::{say, tell};
 
 /// The player's script.
@@ -31,6 +32,15 @@ const LARGEST_PROGRAM: u64 = 256 << 20;
 const HTML: &str = "text/html; charset=utf-8";
 const SCRIPT: &str = "text/javascript; charset=utf-8";
 const JSON: &str = "application/json";
+
+/// What the page of a scene may load and run: what this server gives it, the decoder in its worker, and nothing else. Styles stand
+/// in the page and in the player.
+const SCENE_POLICY: &str = "default-src 'none'; script-src 'self' 'wasm-unsafe-eval'; worker-src blob:; connect-src 'self'; \
+     style-src 'unsafe-inline'; img-src data: blob:; base-uri 'none'; form-action 'none'; frame-ancestors 'none'";
+/// The same for the page that trains. The report that it makes is a page with its scripts inside, and inherits this policy.
+const TRAINER_POLICY: &str = "default-src 'none'; script-src 'self' 'unsafe-inline' 'wasm-unsafe-eval'; worker-src blob:; \
+     connect-src 'self' blob:; style-src 'unsafe-inline'; img-src data: blob:; base-uri 'none'; form-action 'none'; \
+     frame-ancestors 'none'";
 
 /// Most cameras of each split that the player lists.
 const MOST_CAMERAS: usize = 500;
@@ -68,27 +78,27 @@ impl View {
 
     /// A page that plays a scene.
     fn play(&self, what: &Path) -> Result<(), TrainError> {
-        let source = if what.is_dir() { ViewSource::run(what, self.device)? } else { ViewSource::file(what)? };
+        let limits = light4gs_web::limits();
+        let mut source =
+            if what.is_dir() { ViewSource::run(what, self.device)? } else { ViewSource::file(what, &limits)? };
         let cameras = match (&self.scene, source.dataset()) {
             (None, Some(dataset)) => cameras_json(dataset, MOST_CAMERAS),
             _ => dataset_cameras(what, self.scene.as_deref(), MOST_CAMERAS)?,
         };
         let content = Content::Served { scene: "scene.l4gs", cameras: "cameras.json", watch: "state.json" };
         let html = page(&source.title(), content, Some(PLAYER_ADDRESS));
-        let source = Mutex::new(source);
-        self.serve(move |path| match path {
-            "/" => Some(answer(HTML, html.clone().into_bytes())),
-            "/cameras.json" => Some(answer(JSON, cameras.clone().into_bytes())),
+        let (html, cameras) = (Body::from(html), Body::from(cameras));
+        let state = State { shown: Mutex::new(source.refresh().clone()), source: Mutex::new(source) };
+        self.serve(SCENE_POLICY, move |path| match path {
+            "/" => Some(answer(HTML, html.clone())),
+            "/cameras.json" => Some(answer(JSON, cameras.clone())),
             "/scene.l4gs" => {
-                let source = source.lock().unwrap_or_else(PoisonError::into_inner);
-                (source.version() > 0).then(|| answer("application/octet-stream", source.bytes().to_vec()))
+                let Shown { bytes, version, .. } = state.shown();
+                (version > 0).then(|| answer("application/octet-stream", bytes))
             }
             "/state.json" => {
-                let mut source = source.lock().unwrap_or_else(PoisonError::into_inner);
-                let problem = source.refresh().err().map(|error| error.to_string());
-                let status = problem.as_deref().unwrap_or(source.status());
-                let state = json!({ "scene": source.version(), "status": status });
-                Some(answer(JSON, state.to_string().into_bytes()))
+                let Shown { version, status, .. } = state.newest();
+                Some(answer(JSON, json!({ "scene": version, "status": status }).to_string()))
             }
             _ => None,
         })
@@ -103,18 +113,23 @@ impl View {
                 "{program} is no WebAssembly module; bindings/web/build-trainer makes one"
             )));
         }
-        self.serve(move |path| match path {
-            "/" => Some(answer(HTML, TRAINER_PAGE.as_bytes())),
-            "/light4gs-trainer.js" => Some(answer(SCRIPT, TRAINER.as_bytes())),
+        let module = Arc::new(module);
+        self.serve(TRAINER_POLICY, move |path| match path {
+            "/" => Some(answer(HTML, TRAINER_PAGE)),
+            "/light4gs-trainer.js" => Some(answer(SCRIPT, TRAINER)),
             "/light4gs-web-trainer.wasm" => Some(answer("application/wasm", module.clone())),
             _ => None,
         })
     }
 
     /// Serves a page with the player's script until the program is ended.
-    fn serve(&self, respond: impl Fn(&str) -> Option<Answer> + Send + Sync + 'static) -> Result<(), TrainError> {
+    fn serve(
+        &self,
+        policy: &'static str,
+        respond: impl Fn(&str) -> Option<Answer> + Send + Sync + 'static,
+    ) -> Result<(), TrainError> {
         let port = self.port;
-        let server = Server::bind(port).map_err(|error| {
+        let server = Server::bind(port, policy).map_err(|error| {
             TrainError::Input(format!(
                 "cannot listen on port {port}: {error}; choose another with --port, or 0 for any"
             ))
@@ -126,15 +141,41 @@ impl View {
             open_browser(&address);
         }
         server.run(move |path| match path.strip_prefix('/') {
-            Some(PLAYER_ADDRESS) => Some(answer(SCRIPT, PLAYER.as_bytes())),
+            Some(PLAYER_ADDRESS) => Some(answer(SCRIPT, PLAYER)),
             _ => respond(path),
         });
         Ok(())
     }
 }
 
-fn answer(content_type: &'static str, body: impl Into<Cow<'static, [u8]>>) -> Answer {
+fn answer(content_type: &'static str, body: impl Into<Body>) -> Answer {
     Answer { content_type, body: body.into() }
+}
+
+/// What the page asks for again and again.
+#[derive(Debug)]
+struct State {
+    source: Mutex<ViewSource>,
+    /// That of the source when it was looked at last: readers need not wait while a scene is read.
+    shown: Mutex<Shown>,
+}
+
+impl State {
+    fn shown(&self) -> Shown {
+        self.shown.lock().unwrap_or_else(PoisonError::into_inner).clone()
+    }
+
+    /// Looks for a newer scene, unless somebody else is at it.
+    fn newest(&self) -> Shown {
+        let mut source = match self.source.try_lock() {
+            Ok(source) => source,
+            Err(TryLockError::Poisoned(poisoned)) => poisoned.into_inner(),
+            Err(TryLockError::WouldBlock) => return self.shown(),
+        };
+        let newest = source.refresh().clone();
+        self.shown.lock().unwrap_or_else(PoisonError::into_inner).clone_from(&newest);
+        newest
+    }
 }
 
 /// The cameras for a file as JSON: those of a named dataset, else those of the run whose folder holds the file, else
