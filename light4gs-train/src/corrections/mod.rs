@@ -36,6 +36,7 @@ pub use poses::Pose;
 pub use view::{GradientOfView, LearnedView, ViewCorrection};
 
 use crate::optimization::schedule::ExponentialDecay;
+use crate::stage::Stage;
 use rows::{Rows, means, medians};
 
 /// A rate of a correction, and the largest that does not leave the range of corrections in one step.
@@ -56,17 +57,18 @@ keys! {
 }
 
 keys! {
-    /// How corrections of exposures, poses and times are learned: Adam's rates at the beginning and at the end of a run, and
-    /// weights that hold them at what the dataset says.
+    /// How corrections of exposures, poses and times are learned. The rates are Adam's at the beginning and at the end of a run
+    /// that looks at each frame or camera a hundred times; with fewer looks they are larger in proportion, up to three times,
+    /// and with more they are smaller, down to a fifth.
     pub struct CorrectionRates {
         /// Poses and times are corrected from this iteration on, counted over both stages: before, there is no scene to compare with.
         from: usize = 300; ITERATION, "ours";
-        /// Exposures, first step: logarithms of gains, and offsets in shares of white.
-        exposure_init: f64 = 5e-3; CORRECTION_RATE, "ours";
+        /// Exposures, first step: logarithms of gains, and, a quarter of it, offsets in shares of white.
+        exposure_init: f64 = 2e-2; CORRECTION_RATE, "ours";
         /// Exposures, end of the run.
         exposure_final: f64 = 2e-4; CORRECTION_RATE, "ours";
         /// Weight of the squares of the logarithms of gains, and of offsets.
-        exposure_weight: f32 = 0.02; WEIGHT, "ours";
+        exposure_weight: f32 = 0.1; WEIGHT, "ours";
         /// Turns of cameras, first step, radians.
         turn_init: f64 = 1e-3; CORRECTION_RATE, "ours";
         /// Turns, end of the run.
@@ -76,12 +78,17 @@ keys! {
         /// Translations, end of the run.
         translation_final: f64 = 1e-5; CORRECTION_RATE, "ours";
         /// Offsets of times, first step, in intervals between two frames.
-        time_init: f64 = 2e-2; CORRECTION_RATE, "ours";
+        time_init: f64 = 4e-2; CORRECTION_RATE, "ours";
         /// Offsets of times, end of the run.
-        time_final: f64 = 2e-4; CORRECTION_RATE, "ours";
+        time_final: f64 = 4e-4; CORRECTION_RATE, "ours";
     }
 }
 
+/// The rate of an exposure's offsets as a share of that of its gains: what differs between images is mostly the gain.
+const OFFSET_RATE: f32 = 0.25;
+/// Offsets of times are learned in every n-th iteration: there are few of them, and the derivative needs the Gaussians at two
+/// more times.
+const TIME_EVERY: usize = 4;
 /// Largest offset of a time, either way, in intervals between two frames.
 const MOST_INTERVALS: f32 = 5.0;
 
@@ -100,8 +107,37 @@ pub struct Corrections {
     background: [f32; 3],
     /// The training frames as the dataset has them, without images; empty where nothing is corrected.
     frames: Vec<Frame>,
-    /// Iterations of a run, over both stages.
-    iterations: usize,
+    schedule: Schedule,
+}
+
+/// The length of a run.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Schedule {
+    /// Iterations over both stages.
+    pub iterations: usize,
+    /// Views of an iteration.
+    pub views: usize,
+}
+
+impl Schedule {
+    /// Looks at each row for which the rates are given, and the least and the largest factor of them.
+    const LOOKS: f64 = 100.0;
+    const FACTORS: [f64; 2] = [0.2, 3.0];
+
+    /// The looks at each of `rows` rows, if all are looked at equally often.
+    fn looks(&self, rows: usize) -> f64 {
+        (self.iterations * self.views) as f64 / rows as f64
+    }
+
+    /// A rate at an iteration, for one of `rows` rows that has been looked at `seen` times. A row that the sampler shows late has
+    /// its whole way before it, so its rate decays with its own looks.
+    fn rate(&self, first: f64, last: f64, rows: usize, seen: u32, iteration: usize) -> f32 {
+        let looks = self.looks(rows);
+        let [least, most] = Self::FACTORS;
+        let factor = (Self::LOOKS / looks).clamp(least, most);
+        let progress = (f64::from(seen) / looks).min(iteration as f64 / self.iterations as f64);
+        (factor * ExponentialDecay::new(first, last, 1).at(progress)) as f32
+    }
 }
 
 /// The interval between two times of a split; 1 where there is one time.
@@ -120,9 +156,9 @@ fn bits_of_pose(frame: &Frame) -> Vec<u32> {
 }
 
 impl Corrections {
-    /// None made yet, for a run of `iterations` over both stages. Where all frames are of one camera, it has no offset of
+    /// None made yet, for a run of this length. Where all frames are of one camera, it has no offset of
     /// time and no exposure of its own, since it could differ from nothing.
-    pub fn new(config: &CorrectionsConfig, data: &Scene, iterations: usize) -> Self {
+    pub fn new(config: &CorrectionsConfig, data: &Scene, schedule: Schedule) -> Self {
         let frames = &data.train;
         let camera = |frame: &Frame| frame.camera_id;
         let exposures = match config.exposure {
@@ -143,7 +179,7 @@ impl Corrections {
             extent: data.extent,
             background: data.background,
             frames: Vec::new(),
-            iterations,
+            schedule,
         };
         if !corrections.is_off() {
             corrections.frames.clone_from(frames);
@@ -168,13 +204,17 @@ impl Corrections {
         })
     }
 
-    /// The corrections of a training frame in an iteration, counted over both stages; `None` where nothing is corrected.
-    pub fn of_frame(&self, frame: usize, iteration: usize) -> Option<ViewCorrection> {
+    /// The corrections of a training frame in an iteration of a stage; `None` where nothing is corrected. `iteration` counts
+    /// over both stages.
+    pub fn of_frame(&self, frame: usize, stage: Stage, iteration: usize) -> Option<ViewCorrection> {
         let begun = iteration >= self.rates.from;
+        // In the coarse stage nothing moves, so times have no effect.
+        let timed = begun && stage == Stage::Fine;
         (!self.is_off()).then(|| ViewCorrection {
             exposure: self.exposures.as_ref().map(|rows| rows.of(frame)),
             pose: self.poses.as_ref().filter(|_| begun).map(|rows| Pose::of(rows.of(frame))),
-            intervals: self.times.as_ref().filter(|_| begun).map(|rows| rows.of(frame)[0]),
+            intervals: self.times.as_ref().filter(|_| timed).map(|rows| rows.of(frame)[0]),
+            learns_time: iteration.is_multiple_of(TIME_EVERY),
             interval: self.interval,
             background: self.background,
         })
@@ -183,15 +223,20 @@ impl Corrections {
     /// One step for the frames of an iteration, from the gradient of the loss of each alone. `iteration` counts from 1 over
     /// both stages.
     pub fn learn<'a>(&mut self, views: impl IntoIterator<Item = (usize, &'a GradientOfView)>, iteration: usize) {
-        let rates = &self.rates;
-        let rate = |first: f64, last: f64| {
-            ExponentialDecay::new(first, last, self.iterations.max(1)).at(iteration as f64) as f32
+        let (rates, schedule, extent) = (&self.rates, self.schedule, f64::from(self.extent));
+        let exposure = |rows: usize, seen: u32| {
+            let gain = schedule.rate(rates.exposure_init, rates.exposure_final, rows, seen, iteration);
+            std::array::from_fn(|k| if k < 3 { gain } else { OFFSET_RATE * gain })
         };
-        let exposure = [rate(rates.exposure_init, rates.exposure_final); 6];
-        let turn = rate(rates.turn_init, rates.turn_final);
-        let translation = self.extent * rate(rates.translation_init, rates.translation_final);
-        let pose = [turn, turn, turn, translation, translation, translation];
-        let time = [rate(rates.time_init, rates.time_final)];
+        let pose = |rows: usize, seen: u32| {
+            let turn = schedule.rate(rates.turn_init, rates.turn_final, rows, seen, iteration);
+            let [first, last] = [rates.translation_init, rates.translation_final].map(|rate| extent * rate);
+            let translation = schedule.rate(first, last, rows, seen, iteration);
+            std::array::from_fn(|k| if k < 3 { turn } else { translation })
+        };
+        let time = |rows: usize, seen: u32| {
+            [schedule.rate(rates.time_init, rates.time_final, TIME_EVERY * rows, seen, iteration)]
+        };
         let weight = 2.0 * rates.exposure_weight;
         for (frame, gradient) in views {
             if let (Some(rows), Some(gradient)) = (&mut self.exposures, gradient.exposure) {
@@ -223,7 +268,7 @@ impl Corrections {
             shifted(values, middle, exposure::bounded);
         }
         if let Some(rows) = &mut self.poses {
-            let cameras: Vec<_> = rows.first_frames().into_iter().map(|frame| self.frames[frame].camera).collect();
+            let cameras: Vec<_> = rows.first_frames().map(|frame| self.frames[frame].camera).collect();
             poses::without_common_motion(&mut rows.values, &cameras);
             let extent = self.extent;
             shifted(&mut rows.values, [0.0; 6], |values| poses::bounded(values, extent));
@@ -271,46 +316,31 @@ impl Corrections {
 
     /// What was learned, for readers; `None` where nothing is corrected.
     pub fn record(&self) -> Option<CorrectionsRecord> {
-        let name = |frame: usize| self.frames[frame].name.clone();
-        let camera = |frame: usize| self.frames[frame].camera_id;
-        (!self.is_off()).then(|| CorrectionsRecord {
-            exposures: self
-                .exposures
-                .iter()
-                .flat_map(|rows| {
-                    rows.first_frames().into_iter().map(|frame| ExposureRecord {
-                        frame: (self.unit == ExposureUnit::Frame).then(|| name(frame)),
-                        camera: camera(frame),
-                        exposure: Exposure::of(rows.of(frame)),
-                    })
-                })
-                .collect(),
-            poses: self
-                .poses
-                .iter()
-                .flat_map(|rows| {
-                    rows.first_frames().into_iter().map(|frame| PoseRecord {
-                        frame: name(frame),
-                        camera: camera(frame),
-                        pose: Pose::of(rows.of(frame)),
-                    })
-                })
-                .collect(),
-            times: self
-                .times
-                .iter()
-                .flat_map(|rows| {
-                    rows.first_frames()
-                        .into_iter()
-                        .map(|frame| TimeRecord { camera: camera(frame), frames: rows.of(frame)[0] })
-                })
-                .collect(),
-        })
+        let (name, camera) =
+            (|frame: usize| self.frames[frame].name.clone(), |frame: usize| self.frames[frame].camera_id);
+        let mut record = CorrectionsRecord::default();
+        if let Some(rows) = &self.exposures {
+            let exposure = |frame| ExposureRecord {
+                frame: (self.unit == ExposureUnit::Frame).then(|| name(frame)),
+                camera: camera(frame),
+                exposure: Exposure::of(rows.of(frame)),
+            };
+            record.exposures = rows.first_frames().map(exposure).collect();
+        }
+        if let Some(rows) = &self.poses {
+            let pose = |frame| PoseRecord { frame: name(frame), camera: camera(frame), pose: Pose::of(rows.of(frame)) };
+            record.poses = rows.first_frames().map(pose).collect();
+        }
+        if let Some(rows) = &self.times {
+            let time = |frame| TimeRecord { camera: camera(frame), frames: rows.of(frame)[0] };
+            record.times = rows.first_frames().map(time).collect();
+        }
+        (!self.is_off()).then_some(record)
     }
 }
 
 /// `corrections.json`: what a run has learned about its capture.
-#[derive(Clone, Debug, Serialize)]
+#[derive(Clone, Debug, Default, Serialize)]
 pub struct CorrectionsRecord {
     /// By frame or by camera.
     #[serde(skip_serializing_if = "Vec::is_empty")]

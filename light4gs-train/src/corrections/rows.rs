@@ -17,24 +17,26 @@ pub(super) struct Rows<const N: usize> {
     steps: Vec<u32>,
     /// The row of each training frame.
     of_frame: Vec<usize>,
+    /// The first training frame of each row.
+    first_frames: Vec<usize>,
 }
 
 impl<const N: usize> Rows<N> {
     /// A row for each different key of the training frames, in the order in which they occur. `None` for a single one, which
     /// could differ from nothing.
-    pub(super) fn by<K: PartialEq>(keys: impl Iterator<Item = K>) -> Option<Self>
-    where
-        K: Ord,
-    {
+    pub(super) fn by<K: Ord>(keys: impl Iterator<Item = K>) -> Option<Self> {
         let mut rows = BTreeMap::new();
-        let mut of_frame = Vec::new();
-        for key in keys {
-            let next = rows.len();
-            of_frame.push(*rows.entry(key).or_insert(next));
+        let (mut of_frame, mut first_frames) = (Vec::new(), Vec::new());
+        for (frame, key) in keys.enumerate() {
+            let row = *rows.entry(key).or_insert_with(|| {
+                first_frames.push(frame);
+                first_frames.len() - 1
+            });
+            of_frame.push(row);
         }
-        let count = rows.len();
+        let count = first_frames.len();
         let zeros = || vec![[0.0; N]; count];
-        let made = Self { values: zeros(), moments: [zeros(), zeros()], steps: vec![0; count], of_frame };
+        let made = Self { values: zeros(), moments: [zeros(), zeros()], steps: vec![0; count], of_frame, first_frames };
         (count > 1).then_some(made)
     }
 
@@ -53,14 +55,15 @@ impl<const N: usize> Rows<N> {
     }
 
     /// A training frame of each row: the first.
-    pub(super) fn first_frames(&self) -> Vec<usize> {
-        let first = |row| self.of_frame.iter().position(|of| *of == row).expect("each row has a frame");
-        (0..self.len()).map(first).collect()
+    pub(super) fn first_frames(&self) -> impl Iterator<Item = usize> {
+        self.first_frames.iter().copied()
     }
 
-    /// One step of Adam for the row of a training frame.
-    pub(super) fn step(&mut self, frame: usize, gradient: [f32; N], rates: [f32; N]) {
+    /// One step of Adam for the row of a training frame. `rates` gives the rates for the number of rows and the steps that this
+    /// one has taken.
+    pub(super) fn step(&mut self, frame: usize, gradient: [f32; N], rates: impl Fn(usize, u32) -> [f32; N]) {
         let row = self.row(frame);
+        let rates = rates(self.len(), self.steps[row]);
         let [first, second] = &mut self.moments;
         self.steps[row] = self.steps[row].saturating_add(1);
         let debiased = BETAS.map(|beta| 1.0 - beta.powi(self.steps[row].try_into().unwrap_or(i32::MAX)));

@@ -15,6 +15,8 @@ pub struct ViewCorrection {
     pub(super) pose: Option<Pose>,
     /// Offset of the time, in intervals between two frames.
     pub(super) intervals: Option<f32>,
+    /// Whether the offset is learned from this view.
+    pub(super) learns_time: bool,
     /// From one time to the next.
     pub(super) interval: f32,
     pub(super) background: [f32; 3],
@@ -56,7 +58,7 @@ impl ViewCorrection {
         LearnedView {
             exposure: self.exposure.map(|values| leaf(&values)),
             pose: self.pose.map(|_| leaf(&[0.0; 6])),
-            time: self.intervals.map(|_| leaf(&[0.0])),
+            time: self.intervals.filter(|_| self.learns_time).map(|_| leaf(&[0.0])),
             correction: *self,
         }
     }
@@ -67,7 +69,7 @@ impl ViewCorrection {
         GradientOfView {
             exposure: self.exposure.map(|_| part(0)),
             pose: self.pose.map(|pose| pose.gradient(part(6))),
-            time: self.intervals.map(|_| factor * numbers[12]),
+            time: self.intervals.filter(|_| self.learns_time).map(|_| factor * numbers[12]),
         }
     }
 }

@@ -18,7 +18,7 @@ use super::profile::Profile;
 use super::views::ViewPools;
 use crate::compression::{Compression, ConfiguredModels, EntropyModels, compression_input};
 use crate::config::Config;
-use crate::corrections::Corrections;
+use crate::corrections::{Corrections, Schedule};
 use crate::dataset::{ImageSource, image_store, scene_meta};
 use crate::density::{DensityStrategy, SignificanceScore, VolumeWeightedScore};
 use crate::device;
@@ -330,7 +330,8 @@ impl<F: DeformationField, E: EntropyModels> TrainerBuilder<F, E> {
         let count = state.scene.gaussians.len();
         let train = &config.train;
         let iterations = train.coarse_iterations + train.fine_iterations;
-        let mut corrections = Corrections::new(&train.corrections, &data, iterations);
+        let schedule = Schedule { iterations, views: train.batch_size.max(1) };
+        let mut corrections = Corrections::new(&train.corrections, &data, schedule);
         match checkpoint {
             None => density.begin_stage(count, &device.clone().inner()),
             Some(path) => density

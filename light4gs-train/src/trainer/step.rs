@@ -144,7 +144,7 @@ impl<F: DeformationField, E: EntropyModels> Trainer<F, E> {
 
     /// The corrections of a training frame in an iteration of a stage, where there are any.
     pub(super) fn correction(&self, stage: Stage, iteration: usize, frame: usize) -> Option<ViewCorrection> {
-        self.corrections.of_frame(frame, self.config.train.global_step(stage, iteration))
+        self.corrections.of_frame(frame, stage, self.config.train.global_step(stage, iteration))
     }
 
     /// One step of the corrections, with the gradients of the views `indices`.

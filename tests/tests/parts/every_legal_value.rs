@@ -29,7 +29,7 @@ type Overrides = &'static [(&'static str, &'static str)];
 
 /// Other keys that must be set where a value is not legal, or has no effect, alone. A name that ends in a dot is that of a
 /// table: every key in it.
-const COMPANIONS: [(&str, &str, Overrides); 17] = [
+const COMPANIONS: [(&str, &str, Overrides); 18] = [
     ("train.coarse_iterations", "0", &[("train.fine_iterations", "3")]),
     ("train.fine_iterations", "0", &[("train.prune.iterations", "[]"), ("train.coarse_iterations", "3")]),
     (
@@ -41,6 +41,11 @@ const COMPANIONS: [(&str, &str, Overrides); 17] = [
     ("train.densify.adaptive.until", "0", &[("train.densify.adaptive.from", "0")]),
     ("train.prune.iterations", "[1]", &[("train.densify.adaptive.until", "0")]),
     ("train.prune.iterations", "[100000000]", &[("train.fine_iterations", "100000000")]),
+    (
+        "train.corrections.",
+        "",
+        &[("train.exposure", "\"frame\""), ("train.poses", "true"), ("train.corrections.from", "0")],
+    ),
     ("train.guided_sampling.", "", &[("model.field", "\"nodes\""), ("model.nodes.lifetime", "true")]),
     ("train.guided_sampling.count", "", &[("train.guided_sampling.iterations", "[2]")]),
     ("train.guided_sampling.lifetime", "", &[("train.guided_sampling.iterations", "[2]")]),

@@ -6,6 +6,7 @@ mod back_ends_agree;
 mod compression;
 mod context_model;
 mod control_nodes;
+mod corrections;
 mod every_legal_value;
 mod exact_networks;
 mod finite_differences;
