@@ -7,7 +7,10 @@ mod hostile_runs;
 #[cfg(unix)]
 mod kills;
 mod resume;
+mod scene_files;
 mod studies;
+#[cfg(target_os = "linux")]
+mod view;
 
 /// The program under test: Cargo builds it before these tests.
 const PROGRAM: &str = env!("CARGO_BIN_EXE_light4gs-under-test");
