@@ -108,7 +108,7 @@ impl Scene {
         let mut times: Vec<f32> = self.train.iter().chain(&self.test).map(|frame| frame.time).collect();
         times.sort_by(f32::total_cmp);
         times.dedup();
-        let step = (times.len() > 1).then(|| 1.0 / (times.len() - 1) as f32).unwrap_or(0.0);
+        let step = if times.len() > 1 { 1.0 / (times.len() - 1) as f32 } else { 0.0 };
         let mut left_out = 0;
         for split in [&mut self.train, &mut self.test, &mut self.val] {
             let before = split.len();

@@ -197,13 +197,13 @@ fn still_scenes_and_single_images() {
 fn names_in_another_form_of_unicode_and_absolute_paths_are_found() {
     let folder = tempfile::tempdir().unwrap();
     let capture =
-        Capture::new(false, (0..4).map(|i| (format!("caf\u{e9}_{i}"), i as f32 / 3.0, i as f32 / 3.0, None)).collect());
+        Capture::new(false, (0..4).map(|i| (format!("zo\u{eb}_{i}"), i as f32 / 3.0, i as f32 / 3.0, None)).collect());
     let mut document = document(&capture, true);
-    let absolute = folder.path().join("images/caf\u{e9}_1.png");
-    document["frames"][0]["file_path"] = json!("Images/cafe\u{301}_0.PNG");
+    let absolute = folder.path().join("images/zo\u{eb}_1.png");
+    document["frames"][0]["file_path"] = json!("Images/zoe\u{308}_0.PNG");
     document["frames"][1]["file_path"] = json!(absolute);
     let name = folder.path().file_name().unwrap().to_str().unwrap();
-    document["frames"][2]["file_path"] = json!(format!("../{name}/images/caf\u{e9}_2.png"));
+    document["frames"][2]["file_path"] = json!(format!("../{name}/images/zo\u{eb}_2.png"));
     write(folder.path(), &capture, &document);
     check(folder.path(), "nerfstudio", &capture, by_name(&capture.shots));
 }
