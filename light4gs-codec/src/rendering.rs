@@ -9,7 +9,7 @@
 pub const NEAR: f32 = 0.2;
 /// Variance in square pixels that is added to every projected Gaussian, so that none falls between pixels.
 pub const DILATION: f32 = 0.3;
-/// The Jacobian of the projection is evaluated at most this many half fields of view from the view axis.
+/// The Jacobian of the projection is evaluated at most this many half images from the image's middle.
 pub const FRUSTUM_MARGIN: f32 = 1.3;
 /// Side of a tile in pixels.
 pub const TILE: usize = 16;

@@ -41,7 +41,7 @@ fn geometry_of(mean: vec3<f32>, raw_quat: vec4<f32>, scale: vec3<f32>) -> Geomet
     g.scale = scale;
     let z = g.position.z;
     let free = g.position.xy / z;
-    g.slope = clamp(free, -view.limits.xy, view.limits.xy);
+    g.slope = clamp(free, view.slopes.xy, view.slopes.zw);
     g.slope_clamped = g.slope != free;
     let forward = world_row(2u);
     g.row_x = (view.axis_x.w / z) * (world_row(0u) - g.slope.x * forward);

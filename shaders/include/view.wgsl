@@ -10,8 +10,8 @@ struct View {
     // Position of the camera in the world.
     center: vec4<f32>,
     background: vec4<f32>,
-    // Largest slopes x/z and y/z of the Jacobian, then half the image's width and height.
-    limits: vec4<f32>,
+    // Least slopes x/z and y/z of the Jacobian, then the largest ones.
+    slopes: vec4<f32>,
     // Width and height in pixels, then in tiles.
     size: vec4<u32>,
     // Columns and rows of cells, then: which chunk of the lists is blended, and whether it is the last one.

@@ -129,7 +129,7 @@ fn main(
     let middle = 0.5 * (xx + yy);
     let largest = middle + sqrt(max(middle * middle - determinant, 0.1));
     let radius = ceil(3.0 * sqrt(largest));
-    let offset = screen_offset * view.limits.zw;
+    let offset = screen_offset * (0.5 * vec2<f32>(view.size.xy));
     let x = view.axis_x.w * position.x / position.z + view.axis_z.w - 0.5 + offset.x;
     let y = view.axis_y.w * position.y / position.z + view.translation.w - 0.5 + offset.y;
     if (!(is_finite(x) && is_finite(y) && is_finite(radius))) {

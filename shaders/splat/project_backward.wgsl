@@ -117,7 +117,7 @@ fn main(
     );
     let d_conic = vec3<f32>(-0.5 * moments.w, -moments_y.x, -0.5 * moments_y.y);
     gradients[parameters.places.a.w + i] = moments.x / opacity;
-    let d_offset = d_position * view.limits.zw;
+    let d_offset = d_position * (0.5 * vec2<f32>(view.size.xy));
     gradients[parameters.places.b.z + 2u * i] = d_offset.x;
     gradients[parameters.places.b.z + 2u * i + 1u] = d_offset.y;
 

@@ -1,6 +1,7 @@
 //! Plain arrays of activated Gaussians: for random scenes, and as the input of both the operation and its float64 twin.
 
 use burn::tensor::{Device, Tensor, TensorData, s};
+use glam::{Mat3, Quat, Vec2, Vec3};
 use light4gs_data::Camera;
 use light4gs_model::{ActivatedGaussians, Rendering, Splatter};
 
@@ -151,13 +152,29 @@ pub fn image_of(rendering: &Rendering) -> Vec<f32> {
     pixels.flat_map(|((rgb, alpha), depth)| [rgb[0], rgb[1], rgb[2], alpha, depth]).collect()
 }
 
+/// The camera with its principal point moved to `share` of the image's width and height, and turned so that the middle of
+/// its image stays there.
+pub fn with_principal_point(camera: &Camera, share: [f32; 2]) -> Camera {
+    let size = Vec2::new(camera.width as f32, camera.height as f32);
+    let point = size * Vec2::from_array(share);
+    let middle = ((0.5 * size - point) / Vec2::new(camera.fx, camera.fy)).extend(1.0).normalize();
+    let turn = Mat3::from_quat(Quat::from_rotation_arc(Vec3::Z, middle));
+    Camera {
+        rotation: turn * camera.rotation,
+        translation: turn * camera.translation,
+        cx: point.x,
+        cy: point.y,
+        ..*camera
+    }
+}
+
 /// A camera around the origin, at a distance of about 4, with its principal point off the center and unequal focal
 /// lengths.
 pub fn random_camera(width: u32, height: u32, random: &mut Random) -> Camera {
-    let direction = glam::Vec3::from_array([0; 3].map(|_| random.normal() as f32)).normalize();
+    let direction = Vec3::from_array([0; 3].map(|_| random.normal() as f32)).normalize();
     let eye = direction * random.uniform(3.5, 4.5) as f32;
-    let target = glam::Vec3::from_array([0; 3].map(|_| random.uniform(-0.2, 0.2) as f32));
-    let mut camera = Camera::look_at(eye, target, glam::Vec3::new(0.1, 0.2, 1.0), 0.8, width, height);
+    let target = Vec3::from_array([0; 3].map(|_| random.uniform(-0.2, 0.2) as f32));
+    let mut camera = Camera::look_at(eye, target, Vec3::new(0.1, 0.2, 1.0), 0.8, width, height);
     camera.fy *= random.uniform(0.9, 1.1) as f32;
     camera.cx += random.uniform(-0.05, 0.05) as f32 * width as f32;
     camera.cy += random.uniform(-0.05, 0.05) as f32 * height as f32;

@@ -94,9 +94,13 @@ fn project(scene: &SplatScene, index: usize, camera: &Camera, degree: usize) -> 
 
     let (fx, fy) = (f64::from(camera.fx), f64::from(camera.fy));
     let (width, height) = (f64::from(camera.width), f64::from(camera.height));
-    let limit = [1.3 * width / (2.0 * fx), 1.3 * height / (2.0 * fy)];
-    let slope_x = (view.x / view.z).clamp(-limit[0], limit[0]);
-    let slope_y = (view.y / view.z).clamp(-limit[1], limit[1]);
+    // The image's edges as slopes, 15 % of its size further out.
+    let slope = |slope: f64, size: f64, focal: f64, principal: f32| {
+        let principal = f64::from(principal);
+        slope.clamp((-0.15 * size - principal) / focal, (1.15 * size - principal) / focal)
+    };
+    let slope_x = slope(view.x / view.z, width, fx, camera.cx);
+    let slope_y = slope(view.y / view.z, height, fy, camera.cy);
     let jacobian_x = DVec3::new(fx, 0.0, -fx * slope_x) / view.z;
     let jacobian_y = DVec3::new(0.0, fy, -fy * slope_y) / view.z;
     let in_view = world_to_camera * covariance * world_to_camera.transpose();

@@ -13,7 +13,11 @@ fn the_player_has_the_constants_of_rendering() {
     for (name, value, meaning) in [
         ("NEAR", NEAR, "What lies nearer along the view axis is not drawn, world units."),
         ("DILATION", DILATION, "Variance that every projected Gaussian gets on top, square pixels."),
-        ("FRUSTUM_MARGIN", FRUSTUM_MARGIN, "The Jacobian is taken no further out, half fields of view."),
+        (
+            "FRUSTUM_MARGIN",
+            FRUSTUM_MARGIN,
+            "The Jacobian is taken no further from the middle of the image, half images.",
+        ),
         ("MIN_ALPHA", MIN_ALPHA, "A contribution with less alpha is skipped."),
         ("MAX_ALPHA", MAX_ALPHA, "Alpha is clamped here."),
     ] {

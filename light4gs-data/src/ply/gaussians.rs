@@ -21,9 +21,9 @@ pub struct GaussianPly {
     pub sh_dc: Vec<[f32; 3]>,
     /// `[N, 15, 3]`, harmonics of degree 1 to 3, by coefficient, then by channel.
     pub sh_rest: Vec<[[f32; 3]; REST]>,
-    /// `[N]`, logits.
+    /// `[N]`, logits; plus or minus infinity for an opacity of 1 or 0.
     pub opacity_logits: Vec<f32>,
-    /// `[N, 3]`, natural logarithm of world units.
+    /// `[N, 3]`, natural logarithm of world units; minus infinity for a scale of 0.
     pub log_scales: Vec<[f32; 3]>,
     /// `[N, 4]`, `(w, x, y, z)`, not necessarily normalized.
     pub quats: Vec<[f32; 4]>,
@@ -47,9 +47,16 @@ impl GaussianPly {
     ///
     /// # Errors
     /// [`DataError::Io`] when it cannot be read; [`DataError::Ply`] when it is damaged, a property is
-    /// missing, a value is not finite, or the number of `f_rest_*` is not 0, 9, 24 or 45.
+    /// missing, a value is NaN or infinite where that means nothing, or the number of `f_rest_*` is not 0, 9, 24 or 45.
     pub fn read(path: &Path) -> Result<Self, DataError> {
         let table = table::read(path)?;
+        if !table.has("f_dc_0") && !table.has("scale_0") {
+            return Err(DataError::ply(
+                path,
+                "it holds points or a mesh, not Gaussians (it has neither `f_dc_0` nor `scale_0`)",
+                "name the file of a trained scene, such as `point_cloud.ply` of 3DGS",
+            ));
+        }
         let rest = table.properties().iter().filter(|p| p.name.starts_with("f_rest_")).count();
         if ![0, 9, 24, 45].contains(&rest) {
             return Err(DataError::ply(
@@ -68,10 +75,10 @@ impl GaussianPly {
             quats: columns(&table, ["rot_0", "rot_1", "rot_2", "rot_3"])?,
             further: further_columns(&table)?,
         };
-        match gaussians.first_non_finite() {
-            Some(i) => Err(DataError::ply(
+        match gaussians.first_without_meaning() {
+            Some((i, name, value)) => Err(DataError::ply(
                 path,
-                format!("Gaussian {i} has a value that is NaN or infinite"),
+                format!("`{name}` of Gaussian {i} (the first is 0) is {value}, expected a finite number"),
                 "remove such Gaussians",
             )),
             None => Ok(gaussians),
@@ -135,15 +142,22 @@ impl GaussianPly {
         row.extend(self.further.iter().map(|(_, values)| values[i]));
     }
 
-    fn first_non_finite(&self) -> Option<usize> {
-        (0..self.len()).find(|&i| {
-            let finite = |values: &[f32]| values.iter().all(|v| v.is_finite());
-            !(finite(&self.means[i])
-                && finite(&self.sh_dc[i])
-                && self.sh_rest[i].iter().all(|c| finite(c))
-                && self.opacity_logits[i].is_finite()
-                && finite(&self.log_scales[i])
-                && finite(&self.quats[i]))
+    /// The first Gaussian with a value that is NaN or infinite, the name of the property, and the value. An infinite logit
+    /// is an opacity of 0 or 1, and minus infinity the logarithm of a scale of 0.
+    fn first_without_meaning(&self) -> Option<(usize, String, f32)> {
+        let names = names();
+        let has_meaning = |name: &str, value: f32| match name {
+            "opacity" => !value.is_nan(),
+            _ if name.starts_with("scale_") => value.is_finite() || value == f32::NEG_INFINITY,
+            _ => value.is_finite(),
+        };
+        let mut row = Vec::new();
+        (0..self.len()).find_map(|i| {
+            row.clear();
+            self.fill(i, &mut row);
+            let mut named = names.iter().zip(&row);
+            let (name, value) = named.find(|(name, value)| !has_meaning(name, **value))?;
+            Some((i, name.clone(), *value))
         })
     }
 }
@@ -282,13 +296,48 @@ mod tests {
     }
 
     #[test]
+    fn infinite_logits_and_scales_of_zero_are_values() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("g.ply");
+        let mut gaussians = example(3);
+        gaussians.opacity_logits[..2].copy_from_slice(&[f32::INFINITY, f32::NEG_INFINITY]);
+        gaussians.log_scales[1][2] = f32::NEG_INFINITY;
+        gaussians.write(&path).unwrap();
+        assert_eq!(GaussianPly::read(&path).unwrap(), gaussians);
+    }
+
+    #[test]
+    fn points_are_no_gaussians() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("g.ply");
+        let properties = ["x", "y", "z"].map(|name| Property::new(name, Scalar::F32));
+        table::write(&path, ENCODING, &properties, 1, |_, row| row.extend([0.0; 3])).unwrap();
+        let found = GaussianPly::read(&path).unwrap_err().to_string();
+        assert!(found.contains("not Gaussians"), "{found}");
+    }
+
+    #[test]
     fn bad_files_are_errors() {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("g.ply");
         let mut gaussians = example(3);
         gaussians.quats[1][2] = f32::INFINITY;
         gaussians.write(&path).unwrap();
-        assert!(GaussianPly::read(&path).unwrap_err().to_string().contains("Gaussian 1"));
+        let found = GaussianPly::read(&path).unwrap_err().to_string();
+        assert!(found.contains("g.ply: `rot_2` of Gaussian 1 (the first is 0) is inf"), "{found}");
+        for (change, named) in [
+            (|g: &mut GaussianPly| g.log_scales[2][1] = f32::INFINITY, "`scale_1` of Gaussian 2"),
+            (|g: &mut GaussianPly| g.opacity_logits[2] = f32::NAN, "`opacity` of Gaussian 2"),
+            (|g: &mut GaussianPly| g.sh_rest[0][3][2] = f32::NAN, "`f_rest_33` of Gaussian 0"),
+        ] as [(fn(&mut GaussianPly), &str); 3]
+        {
+            let mut gaussians = example(3);
+            change(&mut gaussians);
+            gaussians.write(&path).unwrap();
+            let found = GaussianPly::read(&path).unwrap_err().to_string();
+            assert!(found.contains(named), "{found}");
+        }
+        gaussians.write(&path).unwrap();
         gaussians.quats.pop();
         assert!(gaussians.write(&path).is_err());
         let text = fs::read(&path).unwrap();

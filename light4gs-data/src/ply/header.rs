@@ -15,6 +15,22 @@ pub(super) struct Header {
     pub(super) encoding: Encoding,
     pub(super) rows: u64,
     pub(super) properties: Vec<Property>,
+    /// What stands before the vertices.
+    pub(super) before: Vec<Element>,
+}
+
+/// The rows of another element, which are passed over.
+pub(super) struct Element {
+    pub(super) name: String,
+    pub(super) rows: u64,
+    pub(super) values: Vec<Value>,
+}
+
+/// What a row of an element has for one property.
+#[derive(Clone, Copy)]
+pub(super) enum Value {
+    One(Scalar),
+    List { count: Scalar, each: Scalar },
 }
 
 /// At most the first 40 characters of a word from a file, for a message.
@@ -60,7 +76,13 @@ pub(super) fn read_header(path: &Path, input: &mut impl BufRead) -> Result<Heade
     let mut encoding = None;
     let mut rows = None;
     let mut properties: Vec<Property> = Vec::new();
+    let mut before: Vec<Element> = Vec::new();
     let mut in_vertex = false;
+    let scalar = |kind: &str| Scalar::parse(kind).ok_or_else(|| bad(format!("type `{}` is not known", shorten(kind))));
+    let rows_of = |name: &str, count: &str| {
+        let problem = || bad(format!("the count of `{}`, `{}`, is not a number", shorten(name), shorten(count)));
+        count.parse::<u64>().map_err(|_| problem())
+    };
     loop {
         let line = next_line()?;
         let words: Vec<&str> = line.split_ascii_whitespace().collect();
@@ -80,27 +102,21 @@ pub(super) fn read_header(path: &Path, input: &mut impl BufRead) -> Result<Heade
                 if rows.is_some() {
                     return Err(bad("element `vertex` stands twice".into()));
                 }
-                let count: u64 =
-                    count.parse().map_err(|_| bad(format!("vertex count `{}` is not a number", shorten(count))))?;
-                rows = Some(count);
+                rows = Some(rows_of("vertex", count)?);
                 in_vertex = true;
             }
-            ["element", name, _count] => {
+            ["element", name, count] => {
                 if rows.is_none() {
-                    return Err(bad(format!(
-                        "element `{}` stands before `vertex`, expected the vertices first",
-                        shorten(name)
-                    )));
+                    before.push(Element { name: shorten(name), rows: rows_of(name, count)?, values: Vec::new() });
                 }
                 in_vertex = false;
             }
             ["property", ..] if !in_vertex && rows.is_some() => {}
-            ["property", "list", ..] => {
+            ["property", "list", ..] if in_vertex => {
                 return Err(bad("vertices have a list property, expected scalars".into()));
             }
             ["property", kind, name] if in_vertex => {
-                let scalar =
-                    Scalar::parse(kind).ok_or_else(|| bad(format!("type `{}` is not known", shorten(kind))))?;
+                let scalar = scalar(kind)?;
                 if properties.iter().any(|p| p.name == *name) {
                     return Err(bad(format!("property `{}` stands twice", shorten(name))));
                 }
@@ -108,6 +124,14 @@ pub(super) fn read_header(path: &Path, input: &mut impl BufRead) -> Result<Heade
                     return Err(bad(format!("vertices have more than {MAX_PROPERTIES} properties")));
                 }
                 properties.push(Property::new(*name, scalar));
+            }
+            ["property", kind @ .., _name] if !before.is_empty() && !in_vertex => {
+                let value = match kind {
+                    ["list", count, each] => Value::List { count: scalar(count)?, each: scalar(each)? },
+                    [kind] => Value::One(scalar(kind)?),
+                    _ => return Err(bad(format!("header line `{}` is not understood", shorten(&line)))),
+                };
+                before.last_mut().expect("there is one").values.push(value);
             }
             _ => {
                 return Err(bad(format!("header line `{}` is not understood", shorten(&line))));
@@ -119,5 +143,13 @@ pub(super) fn read_header(path: &Path, input: &mut impl BufRead) -> Result<Heade
     if properties.is_empty() {
         return Err(bad("vertices have no properties".into()));
     }
-    Ok(Header { encoding, rows, properties })
+    if properties.iter().any(|property| property.name == "packed_position") {
+        return Err(DataError::ply(
+            path,
+            "it is a compressed PLY of SuperSplat and PlayCanvas (`packed_position`), which is not read",
+            "export it as PLY without compression; the program splat-transform makes one of it: \
+             `splat-transform scene.compressed.ply scene.ply`",
+        ));
+    }
+    Ok(Header { encoding, rows, properties, before })
 }

@@ -1,7 +1,7 @@
 //! PLY: point clouds and Gaussians in files that other programs read.
 //!
-//! Only scalar properties of the `vertex` element are read (ASCII or binary little endian). Elements after it, such as
-//! faces, are ignored.
+//! Only scalar properties of the `vertex` element are read (ASCII or binary little endian). Other elements, such as cameras
+//! or faces, are ignored, before it and after it.
 
 mod gaussians;
 mod header;

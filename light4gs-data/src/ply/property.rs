@@ -94,6 +94,17 @@ impl Scalar {
         }
     }
 
+    /// A length; none if it is no whole number from 0. `b` has at least `self.size()` bytes.
+    pub(super) fn decode_length(self, b: &[u8]) -> Option<u64> {
+        match self {
+            Self::U32 => Some(u64::from(u32::from_le_bytes([b[0], b[1], b[2], b[3]]))),
+            Self::I32 => u64::try_from(i32::from_le_bytes([b[0], b[1], b[2], b[3]])).ok(),
+            Self::F32 | Self::F64 => None,
+            // These fit into a float32 exactly.
+            _ => Some(self.decode(b)).filter(|length| *length >= 0.0).map(|length| length as u64),
+        }
+    }
+
     pub(super) fn encode(self, value: f32, out: &mut Vec<u8>) {
         match self {
             Self::I8 => out.extend((value as i8).to_le_bytes()),

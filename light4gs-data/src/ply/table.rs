@@ -2,12 +2,12 @@
 //!
 //! The header is not trusted: memory grows with the bytes that are really there, never with a count in the header.
 
-use super::header::{read_header, read_line, shorten};
+use super::header::{Element, Value, read_header, read_line, shorten};
 use super::property::{Encoding, Property};
 use crate::atomic::write_atomically;
 use crate::error::DataError;
 use crate::regular_file::open_regular_file;
-use std::io::{self, BufRead, BufReader, Write};
+use std::io::{self, BufRead, BufReader, Read, Write};
 use std::path::{Path, PathBuf};
 
 /// The vertices of a PLY file, every value as f32.
@@ -70,8 +70,7 @@ impl VertexTable {
 ///
 /// # Errors
 /// [`DataError::Io`] when the file cannot be read; [`DataError::Ply`] when it is not a PLY file, is
-/// truncated, or has a layout that is not supported (big endian, list properties of vertices,
-/// another element before the vertices).
+/// truncated, or has a layout that is not supported (big endian, list properties of vertices, SuperSplat's compression).
 pub fn read(path: &Path) -> Result<VertexTable, DataError> {
     let file = open_regular_file(path).map_err(DataError::io("read", path))?;
     let size = file.metadata().map_err(DataError::io("read", path))?.len();
@@ -81,6 +80,9 @@ pub fn read(path: &Path) -> Result<VertexTable, DataError> {
 /// [`read`] from a stream of at most `size` bytes.
 fn read_from(path: &Path, mut input: impl BufRead, size: u64) -> Result<VertexTable, DataError> {
     let header = read_header(path, &mut input)?;
+    for element in &header.before {
+        pass_over(path, element, header.encoding, &mut input)?;
+    }
     let truncated = |found: usize| {
         DataError::ply(
             path,
@@ -145,6 +147,43 @@ fn read_from(path: &Path, mut input: impl BufRead, size: u64) -> Result<VertexTa
         }
     }
     Ok(VertexTable { path: path.to_path_buf(), properties: header.properties, values })
+}
+
+/// Reads the rows of an element that stands before the vertices. It ends with the file, whatever the header promises.
+fn pass_over(path: &Path, element: &Element, encoding: Encoding, input: &mut impl BufRead) -> Result<(), DataError> {
+    /// A line of text may be longer than one of vertices, since it may hold a list.
+    const LONGEST_LINE: u64 = 1 << 20;
+    let Element { name, rows, values } = element;
+    let bad = |problem: String| DataError::ply(path, problem, "export or copy the file again");
+    let truncated = |found: u64| bad(format!("the header promises {rows} rows of `{name}`, the file holds {found}"));
+    // Rows without values take no bytes, so their number is bounded by nothing.
+    let rows = if values.is_empty() { 0 } else { *rows };
+    for found in 0..rows {
+        if encoding == Encoding::Ascii {
+            let too_long = || format!("the line of row {found} of `{name}` is longer than {LONGEST_LINE} bytes");
+            read_line(path, input, LONGEST_LINE, too_long)?.ok_or_else(|| truncated(found))?;
+            continue;
+        }
+        for value in values {
+            let bytes = match value {
+                Value::One(scalar) => scalar.size() as u64,
+                Value::List { count, each } => {
+                    let mut length = [0; 8];
+                    input.read_exact(&mut length[..count.size()]).map_err(|e| match e.kind() {
+                        io::ErrorKind::UnexpectedEof => truncated(found),
+                        _ => DataError::io("read", path)(e),
+                    })?;
+                    let problem = || bad(format!("row {found} of `{name}` has a list whose length is no whole number"));
+                    count.decode_length(&length).ok_or_else(problem)? * each.size() as u64
+                }
+            };
+            let passed = io::copy(&mut input.by_ref().take(bytes), &mut io::sink());
+            if passed.map_err(DataError::io("read", path))? < bytes {
+                return Err(truncated(found));
+            }
+        }
+    }
+    Ok(())
 }
 
 /// Writes a vertex table; the file is complete or absent, never half-written.
@@ -259,7 +298,10 @@ mod tests {
             ("ply\nformat ascii 1.0\nend_header\n", "no `element vertex`"),
             ("ply\nelement vertex 1\nproperty float x\nend_header\n1\n", "no `format`"),
             ("ply\nformat ascii 1.0\nelement vertex 1\nproperty float x\n", "end_header"),
-            ("ply\nformat ascii 1.0\nelement face 1\n", "before"),
+            ("ply\nformat ascii 1.0\nelement face 1\n", "end_header"),
+            ("ply\nformat ascii 1.0\nelement face x\n", "not a number"),
+            ("ply\nformat ascii 1.0\nelement face 1\nproperty list uchar x\n", "not understood"),
+            ("ply\nformat ascii 1.0\nelement face 1\nproperty quad x\n", "not known"),
             ("ply\nformat ascii 1.0\nproperty float x\n", "not understood"),
             ("ply\nformat ascii 1.0\nelement vertex 1\nelement vertex 1\n", "twice"),
             ("ply\nformat ascii 1.0\nelement vertex 1\nproperty float x\nproperty float x\n", "twice"),
@@ -282,6 +324,42 @@ mod tests {
             (0..2000).map(|i| format!("property char p{i}\n")).collect::<String>()
         );
         assert!(message(&wide).contains("more than 1024"));
+    }
+
+    #[test]
+    fn elements_before_the_vertices_are_passed_over() {
+        let head = |encoding: &str, rows: &str| {
+            format!(
+                "ply\nformat {encoding} 1.0\nelement camera {rows}\nproperty double view\nproperty uchar id\n\
+                 element face 2\nproperty list uchar int corners\nproperty list uint uchar tags\n\
+                 element nothing 18446744073709551615\nelement vertex 1\nproperty float x\nend_header\n"
+            )
+        };
+        let mut bytes = head("binary_little_endian", "2").into_bytes();
+        bytes.extend([9; 18]);
+        bytes.extend([2, 1, 0, 0, 0, 2, 0, 0, 0, 0, 0, 0, 0]);
+        bytes.extend([0, 3, 0, 0, 0, 5, 6, 7]);
+        bytes.extend(1.5f32.to_le_bytes());
+        let read = |bytes: &[u8]| read_from(Path::new("a.ply"), bytes, bytes.len() as u64);
+        assert_eq!(read(&bytes).unwrap().values, [1.5]);
+        for length in 0..bytes.len() {
+            assert!(read(&bytes[..length]).is_err(), "{length}");
+        }
+        let text = |rows: &str| format!("{}0.5 1\n0.5 2\n2 1 2 0\n0 3 5 6 7\n1.5\n", head("ascii", rows));
+        assert_eq!(parse(&text("2")).unwrap().values, [1.5]);
+        assert!(message(&text("18446744073709551615")).contains("rows of `camera`, the file holds 5"));
+        let lengths = "ply\nformat binary_little_endian 1.0\nelement face 1\nproperty list char int x\n\
+                       element vertex 1\nproperty float x\nend_header\n";
+        let negative = [lengths.as_bytes(), &[0xff; 9]].concat();
+        assert!(read(&negative).unwrap_err().to_string().contains("no whole number"));
+    }
+
+    #[test]
+    fn a_compressed_file_is_called_by_its_name() {
+        let text = "ply\nformat binary_little_endian 1.0\nelement chunk 1\nproperty float min_x\nelement vertex 1\n\
+                    property uint packed_position\nproperty uint packed_rotation\nend_header\n";
+        let found = message(text);
+        assert!(found.contains("compressed PLY") && found.contains("splat-transform"), "{found}");
     }
 
     #[test]

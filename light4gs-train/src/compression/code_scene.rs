@@ -181,7 +181,8 @@ pub fn code_scene<F: DeformationField, E: EntropyModels>(
     if profile == Profile::Compact && searches(&config.compression, trained.compression) {
         let exact = render_views(&decodable::<F>(&data, &device)?, &data, &views);
         let error = trained.squared_error(&exact, &views)?;
-        images = Some(SearchImages { render: &render, exact, error, psnr: &psnr });
+        let blank = is_blank(&exact, data.meta.background);
+        images = Some(SearchImages { render: &render, exact, blank, error, psnr: &psnr });
     }
     let Models { compression, settings, fit_seconds } = match trained.compression {
         Some(compression) => Models::of_training(compression, config),
@@ -218,6 +219,16 @@ impl<E: EntropyModels> Models<E> {
 }
 
 impl<F: DeformationField, E: EntropyModels> TrainedScene<'_, F, E> {
+    /// Whether the views by which steps are searched show anything but the background.
+    ///
+    /// # Errors
+    /// [`TrainError::Model`] if the field cannot be written to a file.
+    pub fn is_seen(&self) -> Result<bool, TrainError> {
+        let scene = self.scene.clone().valid();
+        let data = scene.to_arrays(scene_meta(self.config, self.data))?;
+        Ok(!is_blank(&render_views(&scene, &data, &search_views(self.data)), data.meta.background))
+    }
+
     /// Fits models to the scene, whose arrays are `data`; with images, it searches the steps of planes and harmonics first.
     fn fit_models(
         &self,
@@ -227,6 +238,7 @@ impl<F: DeformationField, E: EntropyModels> TrainedScene<'_, F, E> {
     ) -> Result<Models<E>, TrainError> {
         let mut config = self.config.clone();
         match images {
+            Some(images) if images.blank => {}
             Some(images) => plane_and_sh_step_search::search(data, &mut config.compression, images),
             // Where there are images, this was checked before.
             None => drop(decodable::<F>(data, &self.device.clone().inner())?),
@@ -249,7 +261,8 @@ impl<F: DeformationField, E: EntropyModels> TrainedScene<'_, F, E> {
     fn measured_psnr(&self, decoded: &SceneData, device: &Device) -> Result<f64, TrainError> {
         let Some(images) = self.images else {
             return Err(TrainError::Input(
-                "compression.target_db needs the images of a dataset, and this scene has none; give --target-bytes"
+                "compression.target_db needs the images of a dataset, and this scene has none; name one (`import --scene \
+                 DIR`), or bound the bytes with compression.target_bytes"
                     .into(),
             ));
         };
@@ -324,6 +337,11 @@ fn render_views<F: DeformationField>(scene: &DynamicScene<F>, data: &SceneData, 
         image.clamp(0.0, 1.0).into_data().iter::<f32>().collect::<Vec<_>>()
     };
     views.iter().flat_map(image).collect()
+}
+
+/// Whether pixels show a background alone.
+fn is_blank(pixels: &[f32], background: [f32; 3]) -> bool {
+    pixels.chunks_exact(3).all(|pixel| pixel == background.map(|value| value.clamp(0.0, 1.0)))
 }
 
 fn mean_squared_error(pixels: &[f32], views: &[&Frame], images: &dyn ImageSource) -> Result<f64, TrainError> {

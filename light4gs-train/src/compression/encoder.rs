@@ -76,6 +76,8 @@ pub struct SearchImages<'a> {
     pub render: &'a dyn Fn(&SceneData) -> Vec<f32>,
     /// These pixel values for the unquantized scene.
     pub exact: Vec<f32>,
+    /// Whether they show the background alone: then they say nothing about steps, and those of the configuration are taken.
+    pub blank: bool,
     /// Mean squared error of [`SearchImages::exact`].
     pub error: f64,
     /// The PSNR by which `compression.target_db` is reached, dB.
@@ -103,6 +105,7 @@ pub fn encode<F: DeformationField, C: PlaneEntropy, S: ShModel>(
     let mut input = compression_input(compression, scene, data, config, profile)?;
     if let (Some(images), Profile::Compact, None) = (&images, profile, compression.learned_attributes())
         && config.attributes.search_tolerance > 0.0
+        && !images.blank
     {
         let tolerance = config.attributes.search_tolerance;
         // The search tries much finer steps than the given ones. Values that are too large for these, as in a training

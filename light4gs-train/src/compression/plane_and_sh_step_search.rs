@@ -97,7 +97,7 @@ mod tests {
     fn found(tolerance: f64, error: f64) -> CompressionConfig {
         let mut settings = CompressionConfig::default();
         (settings.steps.search_tolerance, settings.sh.search_tolerance) = (tolerance, tolerance);
-        let images = SearchImages { render: &render, exact: render(&scene()), error, psnr: &|_| Ok(0.0) };
+        let images = SearchImages { render: &render, exact: render(&scene()), blank: false, error, psnr: &|_| Ok(0.0) };
         search(&scene(), &mut settings, &images);
         settings
     }

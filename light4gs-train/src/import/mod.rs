@@ -3,9 +3,12 @@
 //! - this file: the result of an import, and how it becomes a run
 //! - [`mod@reference`]: checkpoints of 4DGaussians, and of the public code of Light4GS
 //! - [`still`]: plain Gaussians without motion, from a PLY file
+//! - `bounds`, `extent`: values that would cost all others their precision; middle and size of a scene
 //! - `settings`: the switches in 4DGaussians' `cfg_args`
 //! - `views`: cameras around a scene without a dataset
 
+mod bounds;
+mod extent;
 pub mod reference;
 mod settings;
 pub mod still;

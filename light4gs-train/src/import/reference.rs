@@ -21,6 +21,7 @@ use light4gs_model::{
 };
 
 use super::ImportedScene;
+use super::bounds::make_finite;
 use super::settings::Settings;
 use super::still::read_gaussians;
 use crate::error::TrainError;
@@ -41,7 +42,8 @@ pub fn read(folder: &Path, device: &Device) -> Result<ImportedScene, TrainError>
         Some(path) => Settings::read(&path)?,
         None => Settings::default(),
     };
-    let (gaussians, _) = read_gaussians(&folder.join("point_cloud.ply"))?;
+    let (mut gaussians, _) = read_gaussians(&folder.join("point_cloud.ply"))?;
+    make_finite(&mut gaussians);
     check_table(&folder, &gaussians)?;
     let path = folder.join("deformation.pth");
     let mut weights = Weights { tensors: read_pytorch(&path)?, path, device };

@@ -4,23 +4,54 @@ use std::path::Path;
 
 use burn::module::Module;
 use burn::tensor::Device;
+use light4gs_codec::attributes::typical_size;
 use light4gs_codec::{GaussianArrays, sh_rest_coefficients};
 use light4gs_data::{DataError, GaussianPly};
 use light4gs_model::{DynamicScene, Gaussians, Pca, SceneCoordinates, StillField};
 
+use super::bounds::bound;
+use super::extent::Extent;
 use crate::error::TrainError;
 
 /// Degree up to which a [`GaussianPly`] is padded.
 const FULL_DEGREE: u8 = 3;
+/// Where the typical Gaussian is a larger share of the scene's radius than this, the step of the positions does not grow with
+/// it.
+const LARGEST: f64 = 0.1;
+/// A [`StillScene::step_share`] below this is worth a word.
+const SUSPICIOUS: f64 = 1e-2;
 
-/// Reads Gaussians that do not move, with the highest degree of harmonics that any of them uses; and the names of
-/// properties that are left out, since 3DGS does not have them.
+/// Plain Gaussians from a file.
+#[derive(Debug)]
+pub struct StillScene {
+    /// The Gaussians, with the highest degree of harmonics that any of them uses.
+    pub scene: DynamicScene<StillField>,
+    /// What was changed or left out, one sentence each.
+    pub notes: Vec<String>,
+    /// The step of the positions, in units of the typical Gaussian as the configuration's is, should be this share of the
+    /// usual one: below 1 where the Gaussians are so large that the usual step would move all of them into one point.
+    pub step_share: f64,
+}
+
+/// Reads Gaussians that do not move. Values that would cost all others their precision are bounded.
 ///
 /// # Errors
 /// As [`GaussianPly::read`]; a file without Gaussians.
-pub fn read(path: &Path, device: &Device) -> Result<(DynamicScene<StillField>, Vec<String>), TrainError> {
-    let (gaussians, left_out) = read_gaussians(path)?;
+pub fn read(path: &Path, device: &Device) -> Result<StillScene, TrainError> {
+    let (mut gaussians, left_out) = read_gaussians(path)?;
+    let mut notes = bound(&mut gaussians);
+    if !left_out.is_empty() {
+        notes.push(format!("left out, since 3DGS does not have it: {}", left_out.join(", ")));
+    }
     let gaussians = with_used_degree(gaussians);
+    let step_share = step_share(&gaussians);
+    if step_share < SUSPICIOUS {
+        notes.push(format!(
+            "the typical Gaussian is {:.0} times as large as the scene; if that is not meant: the layout has the natural \
+             logarithms of scales",
+            LARGEST / step_share
+        ));
+    }
     let pca = Pca::fit(&gaussians.means);
     let scene = DynamicScene {
         gaussians: Gaussians::from_arrays(&gaussians, device),
@@ -29,7 +60,13 @@ pub fn read(path: &Path, device: &Device) -> Result<(DynamicScene<StillField>, V
         differentiate_points: false,
     }
     .no_grad();
-    Ok((scene, left_out))
+    Ok(StillScene { scene, notes, step_share })
+}
+
+/// See [`StillScene::step_share`].
+fn step_share(gaussians: &GaussianArrays) -> f64 {
+    let (of_means, typical) = (Extent::of(gaussians).of_means, f64::from(typical_size(&gaussians.log_scales)));
+    if of_means > 0.0 && typical > 0.0 { (LARGEST * of_means / typical).min(1.0) } else { 1.0 }
 }
 
 /// Gaussians of degree 3, in which coefficients that the file lacks are 0; and the names of further properties.

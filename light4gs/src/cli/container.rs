@@ -29,7 +29,7 @@ use super::limits::LimitsArgument;
 use super::output::progress::FitBar;
 use super::output::{say, say_json, tell};
 use super::train::{coding_table, sections_table};
-use super::wishes::{bytes, decibels};
+use super::wishes::{bytes, check_quality, decibels};
 
 #[derive(Debug, Args)]
 pub(super) struct Encode {
@@ -49,7 +49,8 @@ pub(super) struct Encode {
     /// The most bytes of the file, such as 300k or 2M; nearly all of them are used: the steps of attributes are adapted.
     #[arg(long, value_name = "NUMBER", value_parser = bytes)]
     target_bytes: Option<usize>,
-    /// The least PSNR of the decoded file on the test views, dB: the smallest file that has it is written.
+    /// The least PSNR of the decoded file on the test views, dB: the smallest file that has it is written. If none has it, the
+    /// best one is, and the exit code is 2.
     #[arg(long, value_name = "NUMBER", value_parser = decibels, conflicts_with = "target_bytes")]
     target_db: Option<f64>,
     /// Layers of Gaussians, the most significant ones first: with more than 1, such as 4, a player shows a coarse scene after the
@@ -118,11 +119,9 @@ impl Encode {
             }
             other => other,
         })?;
-        if let Some((record, _)) = coded.coding.filter(|_| !self.json) {
-            if let Some(missed) = record.missed_quality {
-                tell(missed);
-            }
-            let table = coding_table(&record);
+        let record = coded.coding.map(|(record, _)| record);
+        if let Some(record) = record.as_ref().filter(|_| !self.json) {
+            let table = coding_table(record);
             if let Some(seconds) = record.fit_seconds.filter(|_| table.is_some()) {
                 say(format_args!("the entropy models were fitted to the finished scene in {seconds:.1} s"))?;
             }
@@ -130,7 +129,7 @@ impl Encode {
                 say(table)?;
             }
         }
-        Ok(())
+        check_quality(record.as_ref(), &self.out)
     }
 }
 
@@ -140,6 +139,12 @@ pub(super) fn code_to_file<F: DeformationField, E: EntropyModels>(
     out: &Path,
     json: bool,
 ) -> Result<CodedScene, TrainError> {
+    if trained.images.is_none() && !trained.is_seen()? {
+        tell(
+            "warning: the views around the scene show nothing of it, for example since all of it is transparent; so the steps \
+             of the file are those of the configuration, and not measured on images",
+        );
+    }
     let mut bar = FitBar::new(json);
     let coded = code_scene(trained, &mut |done, iterations| {
         bar.show(done, iterations);
@@ -227,7 +232,11 @@ fn print_info(info: &StreamInfo, json: bool) -> Result<(), TrainError> {
         let planes = planes.collect::<Vec<_>>().join(", ");
         say(format_args!("feature planes of scale {scale}: {planes}; {} channels", info.plane_channels))?;
     }
-    say(format_args!("motion: {}, {} layers", info.motion.kind, motion_layers(info)))?;
+    say(match (info.motion.kind.as_str(), motion_layers(info)) {
+        ("", 0) => "motion: none".to_owned(),
+        ("", layers) => format!("motion: {layers} layers"),
+        (kind, layers) => format!("motion: {kind}, {layers} layers"),
+    })?;
     if let Some(profile) = info.profile {
         let steps: Vec<String> = info
             .plane_steps

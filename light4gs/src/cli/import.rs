@@ -4,16 +4,18 @@ use std::path::{Path, PathBuf};
 
 use clap::{Args, ValueEnum};
 use light4gs_data::Scene;
+use light4gs_model::attributes::MEANS;
 use light4gs_train::compression::{ConfiguredModels, TrainedScene};
 use light4gs_train::config::{Config, DeviceName};
 use light4gs_train::dataset::{image_store, load_options};
 use light4gs_train::device;
 use light4gs_train::error::TrainError;
-use light4gs_train::import::{reference, scene_around, still};
+use light4gs_train::import::still::{self, StillScene};
+use light4gs_train::import::{reference, scene_around};
 
 use super::check_output;
 use super::container::code_to_file;
-use super::output::say;
+use super::output::{say, tell};
 
 #[derive(Clone, Copy, Debug, ValueEnum)]
 enum Source {
@@ -95,9 +97,12 @@ impl Import {
         }
         check_output(&self.out, &self.source)?;
         let device = device::open(config.device)?.autodiff();
-        let (scene, left_out) = still::read(&self.source, &device)?;
-        if !left_out.is_empty() && !self.json {
-            say(format_args!("left out, since 3DGS does not have it: {}", left_out.join(", ")))?;
+        let StillScene { scene, notes, step_share } = still::read(&self.source, &device)?;
+        for note in &notes {
+            tell(format_args!("note: {note}"));
+        }
+        if let Some(step) = config.compression.attributes.step(MEANS).filter(|_| step_share < 1.0) {
+            config.compression.attributes.steps.set(MEANS.name.as_ref(), step_share * f64::from(step));
         }
         config.model.sh_degree = scene.gaussians.sh_degree() as u8;
         let folder = self.source.parent().unwrap_or(Path::new("."));

@@ -4,6 +4,7 @@ use std::path::Path;
 
 use clap::Args;
 use light4gs_data::{Camera, Scene};
+use light4gs_train::compression::CodingRecord;
 use light4gs_train::config::{Config, Overrides};
 use light4gs_train::dataset::load_options;
 use light4gs_train::error::TrainError;
@@ -33,7 +34,7 @@ pub(super) struct Wishes {
     #[arg(long, value_name = "NUMBER", value_parser = bytes)]
     target_bytes: Option<usize>,
     /// The least PSNR of the decoded file on the test views, dB; it becomes hardly better. The weight of a byte in the loss
-    /// follows, in the last part of training.
+    /// follows, in the last part of training. A run that does not reach it is kept, and the exit code is 2.
     #[arg(long, value_name = "NUMBER", value_parser = decibels, conflicts_with = "target_bytes")]
     target_db: Option<f64>,
 }
@@ -164,6 +165,18 @@ pub(super) fn bytes(text: &str) -> Result<usize, String> {
     match digits.parse::<f64>().map(|number| (number * unit).round()) {
         Ok(bytes) if (1e3..=1e12).contains(&bytes) => Ok(bytes as usize),
         _ => Err("expected bytes, from 1000 to 10^12, such as 300000, 300k or 2.5M".to_owned()),
+    }
+}
+
+/// Refuses a finished file that is not as good as was wished. It is kept: with the finest steps, nothing better can be made of
+/// this scene.
+///
+/// # Errors
+/// [`TrainError::Input`] with the PSNR that was wished and the one that was reached.
+pub(super) fn check_quality(coding: Option<&CodingRecord>, file: &Path) -> Result<(), TrainError> {
+    match coding.and_then(|coding| coding.missed_quality) {
+        Some(missed) => Err(TrainError::Input(format!("{missed}. This file is kept: {}", file.display()))),
+        None => Ok(()),
     }
 }
 

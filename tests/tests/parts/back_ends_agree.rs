@@ -11,7 +11,7 @@ use light4gs_model::{ActivatedGaussians, Splatter};
 use light4gs_tests::golden::{assert_close_relative, devices, values_of};
 use light4gs_tests::odd_scenes::{BACKGROUND, Run, SIZES, make_odd, point_in_view, poison, run_weighed};
 use light4gs_tests::random::Random;
-use light4gs_tests::splat_scene::{ATTRIBUTES, MEANS, Ranges, SCALES, SplatScene, random_camera};
+use light4gs_tests::splat_scene::{ATTRIBUTES, MEANS, Ranges, SCALES, SplatScene, random_camera, with_principal_point};
 use light4gs_tests::twin;
 
 const IMAGE: f32 = 2e-4;
@@ -65,30 +65,29 @@ fn assert_agreement(
     }
 }
 
-/// A scene without Gaussians whose tiles or order depend on rounding, some of them made odd, some broken; which of them
-/// can be drawn; and the camera.
-fn odd_scene(count: usize, size: [u32; 2], ranges: &Ranges, random: &mut Random) -> (SplatScene, Vec<bool>, Camera) {
-    let camera = random_camera(size[0], size[1], random);
+/// A scene without Gaussians whose tiles or order depend on rounding, some of them made odd, some broken; and which of
+/// them can be drawn.
+fn odd_scene(count: usize, camera: &Camera, ranges: &Ranges, random: &mut Random) -> (SplatScene, Vec<bool>) {
     let mut scene = SplatScene::random(count, ranges, random);
     for i in 0..count {
         if random.below(6) == 0 {
             let ordinary = scene.row_mut(SCALES, i).to_vec();
-            make_odd(&mut scene, i, &camera, random);
+            make_odd(&mut scene, i, camera, random);
             // Far larger than the scene: in float32 its covariance keeps three digits or fewer on every back end.
             if scene.row_mut(SCALES, i).iter().any(|scale| *scale > 1.0) {
                 scene.row_mut(SCALES, i).copy_from_slice(&ordinary);
             }
         }
     }
-    let (mut scene, _) = twin::render_without_doubt(&scene, &camera, BACKGROUND, 3);
+    let (mut scene, _) = twin::render_without_doubt(&scene, camera, BACKGROUND, 3);
     let mut keep = vec![true; scene.len()];
     for i in 0..scene.len() {
         if random.below(10) == 0 {
             keep[i] = false;
-            poison(&mut scene, i, &camera, random);
+            poison(&mut scene, i, camera, random);
         }
     }
-    (scene, keep, camera)
+    (scene, keep)
 }
 
 #[test]
@@ -100,9 +99,23 @@ fn two_hundred_small_scenes() {
         let size = SIZES[random.below(SIZES.len())];
         let degree = random.below(4);
         let ranges = Ranges { half_size: random.uniform(0.3, 2.0), ..Ranges::default() };
-        let (scene, keep, camera) = odd_scene(count, size, &ranges, &mut random);
+        let camera = random_camera(size[0], size[1], &mut random);
+        let (scene, keep) = odd_scene(count, &camera, &ranges, &mut random);
         let what = format!("seed {seed}, {count} Gaussians, {size:?}, degree {degree}");
         assert_agreement(&what, &scene, &keep, &camera, degree, 1.0, &mut random);
+    }
+}
+
+#[test]
+fn forty_scenes_with_a_principal_point_anywhere() {
+    for seed in 0..40 {
+        let mut random = Random::new(9300 + seed);
+        let size = SIZES[random.below(SIZES.len())];
+        let share = [0; 2].map(|_| random.uniform(-1.5, 2.5) as f32);
+        let camera = with_principal_point(&random_camera(size[0], size[1], &mut random), share);
+        let (scene, keep) = odd_scene(100, &camera, &Ranges::default(), &mut random);
+        let what = format!("seed {seed}, {size:?}, principal point at {share:?}");
+        assert_agreement(&what, &scene, &keep, &camera, 3, 1.0, &mut random);
     }
 }
 
@@ -116,7 +129,8 @@ fn large_scenes() {
     ] {
         let mut random = Random::new(seed);
         let ranges = Ranges { scales: [0.005, 0.05], ..Ranges::default() };
-        let (scene, keep, camera) = odd_scene(count, size, &ranges, &mut random);
+        let camera = random_camera(size[0], size[1], &mut random);
+        let (scene, keep) = odd_scene(count, &camera, &ranges, &mut random);
         let what = format!("{count} Gaussians, {size:?}");
         assert_agreement(&what, &scene, &keep, &camera, 3, doubtful, &mut random);
     }

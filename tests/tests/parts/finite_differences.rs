@@ -19,7 +19,9 @@ use light4gs_model::ops::normal_cdf::normal_cdf;
 use light4gs_model::{FeaturePlanes, PlaneTensors};
 use light4gs_tests::golden::{assert_close_relative, devices, values_of};
 use light4gs_tests::random::Random;
-use light4gs_tests::splat_scene::{ATTRIBUTES, MEANS, Ranges, SH_DC, SplatScene, image_of, random_camera};
+use light4gs_tests::splat_scene::{
+    ATTRIBUTES, MEANS, Ranges, SH_DC, SplatScene, image_of, random_camera, with_principal_point,
+};
 use light4gs_tests::twin;
 
 const BACKGROUND: [f32; 3] = [0.2, 0.5, 0.9];
@@ -104,12 +106,17 @@ fn smooth_scene(camera: &Camera, random: &mut Random) -> SplatScene {
     }
 }
 
+/// The camera, or one whose principal point is outside of the image.
+fn off_axis(moved: bool, camera: Camera) -> Camera {
+    if moved { with_principal_point(&camera, [1.6, -0.4]) } else { camera }
+}
+
 #[test]
 fn splat_along_random_directions() {
     for (name, device) in devices() {
-        for seed in 0..4 {
+        for seed in 0..6 {
             let mut random = Random::new(seed);
-            let camera = random_camera(20, 18, &mut random);
+            let camera = off_axis(seed >= 4, random_camera(20, 18, &mut random));
             let scene = smooth_scene(&camera, &mut random);
             let weights = smooth_weights(&camera, &mut random);
             let tape = device.clone().autodiff();
@@ -133,11 +140,11 @@ fn splat_along_random_directions() {
 /// 2e-3 of the largest entry.
 #[test]
 fn splat_against_the_twin() {
-    for seed in 10..14 {
+    for seed in 10..16 {
         let mut random = Random::new(seed);
         let (width, height) = [(37, 19), (16, 33), (25, 25), (1, 40)][seed as usize % 4];
         let degree = seed as usize % 4;
-        let camera = random_camera(width, height, &mut random);
+        let camera = off_axis(seed >= 14, random_camera(width, height, &mut random));
         let ranges = Ranges { scales: [0.05, 0.5], ..Ranges::default() };
         let scene = SplatScene::random(14, &ranges, &mut random);
         let weights = random.normals((width * height * 5) as usize);

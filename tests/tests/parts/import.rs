@@ -12,7 +12,8 @@ use light4gs_tests::pytorch::{StateDict, save_state_dict};
 use light4gs_tests::random::Random;
 use light4gs_train::compression::{ConfiguredModels, TrainedScene, code_scene};
 use light4gs_train::config::Config;
-use light4gs_train::import::{reference, scene_around, still};
+use light4gs_train::import::still::{self, StillScene};
+use light4gs_train::import::{reference, scene_around};
 use light4gs_train::run::{Checkpoint, RunFolder};
 
 const GRID: &str = "deformation_net.grid";
@@ -398,8 +399,8 @@ fn a_ply_becomes_a_file_that_renders_alike() {
     let path = folder.path().join("blob.ply");
     blob(500).write(&path).unwrap();
     let device = Device::flex().autodiff();
-    let (scene, left_out) = still::read(&path, &device).unwrap();
-    assert!(left_out.is_empty(), "{left_out:?}");
+    let StillScene { scene, notes, step_share } = still::read(&path, &device).unwrap();
+    assert!(notes.is_empty() && step_share == 1.0, "{notes:?} {step_share}");
     let config = small_fit("imported");
     let data = scene_around(&scene.gaussians.to_arrays(), folder.path(), [0.0; 3]).unwrap();
     let trained = TrainedScene {

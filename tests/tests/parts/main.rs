@@ -15,6 +15,7 @@ mod import;
 mod operations;
 mod plane_convolutions;
 mod poisoned_scenes;
+mod principal_point;
 mod rooms;
 mod sensitivity;
 mod sh_entropy;

@@ -4,6 +4,7 @@ mod animated_glb;
 mod bench;
 mod command_line;
 mod hostile_runs;
+mod import_ply;
 #[cfg(unix)]
 mod kills;
 mod resume;

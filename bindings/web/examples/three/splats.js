@@ -33,8 +33,9 @@ void main() {
 
   // Rows of the projection's Jacobian, in pixels, times the matrix to the camera, at a place not far outside of the image.
   vec2 scale = vec2(projectionMatrix[0][0], projectionMatrix[1][1]);
+  vec2 middle = projectionMatrix[2].xy / scale;
   vec2 limit = 1.3 / scale;
-  vec2 slope = clamp(seen.xy / depth, -limit, limit);
+  vec2 slope = clamp(seen.xy / depth, middle - limit, middle + limit);
   mat3 rows = transpose(mat3(modelViewMatrix));
   vec2 focal = 0.5 * scale * viewport / depth;
   vec3 across = focal.x * (rows[0] + slope.x * rows[2]);

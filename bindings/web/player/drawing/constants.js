@@ -7,7 +7,7 @@ export const NEAR = 0.2;
 /** Variance that every projected Gaussian gets on top, square pixels. */
 export const DILATION = 0.3;
 
-/** The Jacobian is taken no further out, half fields of view. */
+/** The Jacobian is taken no further from the middle of the image, half images. */
 export const FRUSTUM_MARGIN = 1.3;
 
 /** A contribution with less alpha is skipped. */

@@ -45,8 +45,9 @@ void main() {
   if (!(position.z > NEAR) || !(opacity >= MIN_ALPHA)) return;
 
   // Rows of the projection's Jacobian times the view rotation, at a place not far outside of the image.
+  vec2 middle = (0.5 * size - principal) / focal;
   vec2 limit = FRUSTUM_MARGIN * 0.5 * size / focal;
-  vec2 slope = clamp(position.xy / position.z, -limit, limit);
+  vec2 slope = clamp(position.xy / position.z, middle - limit, middle + limit);
   mat3 rows = transpose(rotation);
   vec3 across = focal.x / position.z * (rows[0] - slope.x * rows[2]);
   vec3 down = focal.y / position.z * (rows[1] - slope.y * rows[2]);

@@ -2,8 +2,7 @@
 //! original 3DGS rasterizer), forward and backward, one Gaussian at a time.
 
 use glam::{Mat3, Vec2, Vec3};
-use light4gs_codec::rendering::{DILATION, FRUSTUM_MARGIN, MIN_ALPHA, NEAR, TILE};
-use light4gs_data::Camera;
+use light4gs_codec::rendering::{DILATION, MIN_ALPHA, NEAR, TILE};
 
 use crate::rotation::{normalization_backward, rotation_backward, rotation_matrix};
 use crate::spherical_harmonics::{basis, basis_gradient, coefficient_count};
@@ -87,7 +86,8 @@ struct Geometry {
     slope_clamped: [bool; 2],
 }
 
-fn geometry(gaussians: &GaussianSlices, i: usize, camera: &Camera) -> Geometry {
+fn geometry(gaussians: &GaussianSlices, i: usize, view: &View) -> Geometry {
+    let camera = &view.camera;
     let view_position = camera.rotation * gaussians.mean(i) + camera.translation;
     let raw: [f32; 4] = gaussians.quats[4 * i..4 * i + 4].try_into().expect("four components");
     let quat_norm = raw.iter().map(|q| q * q).sum::<f32>().sqrt();
@@ -96,10 +96,9 @@ fn geometry(gaussians: &GaussianSlices, i: usize, camera: &Camera) -> Geometry {
     let scale = Vec3::from_slice(&gaussians.scales[3 * i..]);
 
     let z = view_position.z;
-    let (tan_x, tan_y) = camera.tan_half_fov();
-    let limit = FRUSTUM_MARGIN * Vec2::new(tan_x, tan_y);
+    let [least, most] = view.slope_limits();
     let free = view_position.truncate() / z;
-    let slope = free.clamp(-limit, limit);
+    let slope = free.clamp(least, most);
     let slope_clamped = [slope.x != free.x, slope.y != free.y];
     let world = camera.rotation.transpose();
     let (row_x, row_y, row_z) = (world.x_axis, world.y_axis, world.z_axis);
@@ -135,7 +134,7 @@ pub(crate) fn project(gaussians: &GaussianSlices, i: usize, view: &View) -> Spla
         return invalid;
     }
     let camera = &view.camera;
-    let g = geometry(gaussians, i, camera);
+    let g = geometry(gaussians, i, view);
     let position = g.view_position;
     if !(g.quat_norm.is_finite() && g.quat_norm > 1e-12 && position.is_finite()) {
         return invalid;
@@ -244,7 +243,7 @@ pub(crate) fn project_backward(
     grad_rest: &mut [f32],
 ) -> AttributeGradient {
     let camera = &view.camera;
-    let g = geometry(gaussians, i, camera);
+    let g = geometry(gaussians, i, view);
 
     // From the conic to the covariance: d(inverse) = -Q dC Q.
     let [qa, qb, qc] = splat.conic;

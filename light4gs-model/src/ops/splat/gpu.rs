@@ -6,7 +6,7 @@ use burn::tensor::Shape;
 use burn_fusion::{Fusion, FusionBackend};
 use burn_wgpu::{CubeBackend, CubeTensor};
 use cubecl::server::Handle;
-use light4gs_codec::rendering::{FRUSTUM_MARGIN, TILE};
+use light4gs_codec::rendering::TILE;
 use light4gs_render::{CHANNELS, View};
 use light4gs_shaders::{CELL_COUNTS, INTERSECT, PROJECT, PROJECT_BACKWARD, RASTERIZE, RASTERIZE_BACKWARD, Shader};
 
@@ -51,8 +51,7 @@ impl Frame {
     pub(in crate::ops) fn uniform(&self, chunk: usize, chunks: usize) -> Vec<u32> {
         let camera = &self.view.camera;
         let [width, height] = self.size();
-        let (tan_x, tan_y) = camera.tan_half_fov();
-        let limits = [FRUSTUM_MARGIN * tan_x, FRUSTUM_MARGIN * tan_y, 0.5 * width as f32, 0.5 * height as f32];
+        let [least, most] = self.view.slope_limits();
         let rotation = &camera.rotation;
         let floats = [
             rotation.x_axis.extend(camera.fx).to_array(),
@@ -61,7 +60,7 @@ impl Frame {
             camera.translation.extend(camera.cy).to_array(),
             camera.center().extend(0.0).to_array(),
             glam::Vec3::from_array(self.view.background).extend(0.0).to_array(),
-            limits,
+            [least.x, least.y, most.x, most.y],
         ];
         let side = self.team.cell;
         let words = [

@@ -20,9 +20,15 @@ pub(in crate::cli) fn image_size(meta: &SceneMeta, width: Option<u32>) -> Result
     let height = (u64::from(own_height) * u64::from(wanted)).div_ceil(u64::from(own_width)).max(1);
     let fits = wanted <= MOST_SIDE && height <= MOST_SIDE.into() && u64::from(wanted) * height <= MOST_PIXELS;
     if !fits {
+        let (file, remedy) = match width {
+            Some(width) => (
+                format!("--width {width} gives images of {wanted}×{height} pixels, since the file's have"),
+                "a smaller",
+            ),
+            None => ("the file says that its images have".to_owned(), "a"),
+        };
         return Err(TrainError::Input(format!(
-            "images of {wanted}×{height} pixels are too large: at most {MOST_SIDE} a side, and {MOST_PIXELS} in all. The file \
-             says that its scene has {}×{}; give a smaller --width",
+            "{file} {}×{} pixels: at most {MOST_SIDE} a side and {MOST_PIXELS} in all are drawn; give {remedy} --width",
             meta.width, meta.height
         )));
     }
