@@ -79,6 +79,6 @@ mod tests {
         assert!((0..end).all(|known| end_of_head(&text[..end - 1], known.min(end - 1)).is_none()));
         assert!((0..end).all(|known| end_of_head(text, known) == Some(end)));
         assert_eq!(end_of_head(b"GET /\n\n", 0), Some(7));
-        assert_eq!(end_of_head(&[&[b' '; LONGEST_HEAD][..], b"\n\n"].concat(), 0), None);
+        assert_eq!(end_of_head(&[vec![b' '; LONGEST_HEAD], b"\n\n".to_vec()].concat(), 0), None);
     }
 }

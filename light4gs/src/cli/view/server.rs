@@ -217,7 +217,9 @@ mod tests {
         // All of these get bytes, and take none of them.
         let readers: Vec<TcpStream> =
             (0..128).map(|_| send(address, "GET /large HTTP/1.1\r\nHost: localhost\r\n\r\n")).collect();
-        readers.iter().for_each(|reader| assert_eq!(reader.peek(&mut [0; 8]).unwrap(), 8));
+        for reader in &readers {
+            assert_eq!(reader.peek(&mut [0; 8]).unwrap(), 8);
+        }
         std::thread::sleep(Duration::from_secs(2));
         assert!(ask(address, GET).ends_with("hello"));
     }
