@@ -96,10 +96,10 @@ fn contact_sheet(images: &[(String, RgbImage8)]) -> Result<String, DataError> {
         };
         let (data, name) = (data_uri(image).map_err(unwritable)?, escape(name));
         let (width, height) = (image.width, image.height);
-        let _ = write!(
+        let _ = writeln!(
             html,
             "<figure class=\"thumbnail\"><img src=\"{data}\" alt=\"{name}\" width=\"{width}\" height=\"{height}\">\
-             <figcaption>{name}</figcaption></figure>\n"
+             <figcaption>{name}</figcaption></figure>"
         );
     }
     Ok(if html.is_empty() { html } else { format!("<div class=\"sheet\">\n{html}</div>\n") })

@@ -51,7 +51,7 @@ pub(super) fn bounded(values: [f32; 6]) -> [f32; 6] {
 /// The background keeps its color: where an image is transparent, the dataset lays it over the background afterwards. So
 /// gain and offset act on what `alpha [H, W]` covers. Pixels that the scene does not cover are the color of the background.
 pub fn exposed(image: Tensor<3>, alpha: Tensor<2>, values: Tensor<1>, background: [f32; 3]) -> Tensor<3> {
-    let part = |from: usize| values.clone().slice([from..from + 3]).reshape([1, 1, 3]);
+    let part = |from: usize| values.clone().slice(from..from + 3).reshape([1, 1, 3]);
     let (gain, offset) = (part(0).exp(), part(3));
     let alpha = alpha.unsqueeze_dim::<3>(2);
     if background == [0.0; 3] {

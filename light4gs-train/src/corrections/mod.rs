@@ -68,15 +68,15 @@ keys! {
         /// Exposures, end of the run.
         exposure_final: f64 = 2e-4; CORRECTION_RATE, "ours";
         /// Weight of the squares of the logarithms of gains, and of offsets.
-        exposure_weight: f32 = 0.1; WEIGHT, "ours";
+        exposure_weight: f32 = 0.02; WEIGHT, "ours";
         /// Turns of cameras, first step, radians.
         turn_init: f64 = 1e-3; CORRECTION_RATE, "ours";
         /// Turns, end of the run.
         turn_final: f64 = 1e-5; CORRECTION_RATE, "ours";
         /// Translations of cameras, first step, as shares of the scene's extent.
-        translation_init: f64 = 1e-3; CORRECTION_RATE, "ours";
+        translation_init: f64 = 5e-4; CORRECTION_RATE, "ours";
         /// Translations, end of the run.
-        translation_final: f64 = 1e-5; CORRECTION_RATE, "ours";
+        translation_final: f64 = 5e-6; CORRECTION_RATE, "ours";
         /// Offsets of times, first step, in intervals between two frames.
         time_init: f64 = 4e-2; CORRECTION_RATE, "ours";
         /// Offsets of times, end of the run.

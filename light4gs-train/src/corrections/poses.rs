@@ -74,7 +74,7 @@ pub(super) fn turned(
     center: [f32; 3],
 ) -> GaussianTensors {
     let device = gaussians.means.device();
-    let part = |from: usize| further.clone().slice([from..from + 3]).reshape([1, 3]);
+    let part = |from: usize| further.clone().slice(from..from + 3).reshape([1, 3]);
     let center = Tensor::<1>::from_floats(center, &device).reshape([1, 3]);
     let (turn, shift) = (part(0), part(3));
     let rotation = camera.rotation;

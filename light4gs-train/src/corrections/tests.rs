@@ -175,7 +175,8 @@ fn a_checkpoint_restores_all_numbers_and_nothing_else() {
         (corrections.exposures.clone(), corrections.poses.clone(), corrections.times.clone())
     );
 
-    let refused = |change: &dyn Fn(&mut BTreeMap<String, Vec<f32>>)| {
+    type Changed<'a> = &'a mut BTreeMap<String, Vec<f32>>;
+    let refused = |change: &dyn Fn(Changed)| {
         let mut state = corrections.state();
         change(&mut state);
         Corrections::new(&all(ExposureUnit::Frame), &data, SCHEDULE).restore(state).unwrap_err()

@@ -19,8 +19,7 @@ const LONG_FULL: f64 = 0.3;
 /// Advice for a run that comes out badly, from the PSNR of its test views (dB) and the records of its training; empty for a
 /// good one.
 pub(super) fn advice(config: &Config, test: f64, records: &[MetricsRecord]) -> Vec<String> {
-    // Written so that NaN gets none either.
-    if !(test < GOOD) {
+    if test.is_nan() || test >= GOOD {
         return Vec::new();
     }
     let fine: Vec<&MetricsRecord> = records.iter().filter(|record| record.stage == Stage::Fine).collect();

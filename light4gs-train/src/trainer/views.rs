@@ -96,19 +96,22 @@ impl<F: DeformationField, E: EntropyModels> Trainer<F, E> {
     }
 }
 
+/// A frame and what has been learned about its camera.
+type CorrectedFrame<'f> = (&'f Frame, Option<ViewCorrection>);
+
 impl ViewPass<'_> {
     /// Renders and differentiates every frame, and meanwhile does what needs no view. The results, in the order of the
     /// frames, do not depend on the pools.
     pub(super) fn run<'f, F: DeformationField, R>(
         &self,
         scene: &DynamicScene<F>,
-        frames: &[(&'f Frame, Option<ViewCorrection>)],
+        frames: &[CorrectedFrame<'f>],
         pools: &ViewPools,
         profile: &Profile,
         meanwhile: impl FnOnce() -> R,
     ) -> Result<(Vec<View>, R), TrainError> {
         // Copies share the scene's memory; each begins its own tape.
-        let with_copies = |frames: &[(&'f Frame, Option<ViewCorrection>)]| -> Vec<_> {
+        let with_copies = |frames: &[CorrectedFrame<'f>]| -> Vec<_> {
             frames.iter().map(|frame| (on_a_new_tape(scene.clone()), *frame)).collect()
         };
         let ViewPools(pools) = pools;
@@ -134,7 +137,7 @@ impl ViewPass<'_> {
 
     fn views<F: DeformationField>(
         &self,
-        tasks: Vec<(DynamicScene<F>, (&Frame, Option<ViewCorrection>))>,
+        tasks: Vec<(DynamicScene<F>, CorrectedFrame<'_>)>,
         profile: &Profile,
     ) -> Result<Vec<View>, TrainError> {
         tasks.into_iter().map(|(scene, (frame, correction))| self.view(scene, frame, correction, profile)).collect()
