@@ -14,7 +14,8 @@
 //! | decode images within a memory bound | [`ImageStore`] |
 //! | take metrics over parts of an image | [`regions`] |
 //! | see what a dataset is taken for | [`CaptureSummary`] |
-//! | find cameras of a rig that are out of step | [`change_curves`], [`out_of_step`] |
+//! | see what makes a capture hard | [`camera_curves`], [`capture_faults`] |
+//! | find cameras of a rig that are out of step | [`out_of_step`] |
 //! | notice that a dataset has changed | [`DatasetDigest`] |
 //! | make a camera, or a path of cameras | [`Camera::look_at`], [`orbit_path`] |
 //! | undo the distortion of a lens | nothing: [`ImageStore`] does it; [`Lens`] is the model |
@@ -61,9 +62,11 @@
 
 mod atomic;
 mod camera;
+mod curves;
 mod digest;
 mod error;
 mod exchange;
+mod faults;
 mod frame;
 mod images;
 mod layouts;
@@ -71,6 +74,7 @@ mod lens;
 mod numbered;
 mod options;
 mod orbit;
+mod parallax;
 pub mod ply;
 mod points;
 mod prepare;
@@ -84,11 +88,13 @@ mod synthetic;
 
 pub use atomic::{is_temporary_name, process_id, sweep_leftovers, write_atomically};
 pub use camera::{Camera, Intrinsics, PoseError};
+pub use curves::{CameraCurve, camera_curves};
 pub use digest::DatasetDigest;
 pub use error::DataError;
 pub use exchange::{
     GlbOptions, Influence, Joint, JointPose, MotionSample, Skin, glb_bytes, write_four_dgs, write_glb, write_ply_zip,
 };
+pub use faults::capture_faults;
 pub use frame::{Frame, Mask, MaskMeaning};
 pub use images::{
     ImageStore, PixelMask, Region, RgbImage8, RgbImage32, composite, composite_resized, image_size, regions,
@@ -105,5 +111,5 @@ pub use pytorch::{PlainTensor, read_pytorch};
 pub use regular_file::{open_regular_file, read_regular_file, read_regular_text};
 pub use scene::{Reading, Scene, Split, SplitFrames};
 pub use summary::{CaptureFact, CaptureSummary};
-pub use synchrony::{ChangeCurve, OutOfStep, change_curves, out_of_step};
+pub use synchrony::{OutOfStep, out_of_step};
 pub use synthetic::{SyntheticOptions, write_synthetic};

@@ -108,6 +108,8 @@ pub struct Reading {
     pub cameras: String,
     /// Such as `the last number in the images' names`. Empty: as the layout has them.
     pub times: String,
+    /// Images beside those that are used, without a pose.
+    pub unposed: usize,
 }
 
 /// Far more than any capture has: 20 cameras for half an hour.

@@ -4,7 +4,7 @@ use std::fmt::Write as _;
 use std::path::Path;
 
 use glam::Vec3;
-use light4gs_data::{CaptureSummary, ChangeCurve, DataError, Frame, RgbImage8, Scene};
+use light4gs_data::{CameraCurve, CaptureSummary, DataError, Frame, RgbImage8, Scene};
 
 use super::chart::{Chart, Mark, Series};
 use super::html::escape;
@@ -32,7 +32,7 @@ pub(super) fn section(capture: &CaptureSummary) -> String {
         let _ = writeln!(html, "<tr><th scope=\"row\">{what}</th><td>{found}</td></tr>");
     }
     html.push_str("</table>\n");
-    for (kind, texts) in [("Problem", &capture.problems), ("Note", &capture.notes)] {
+    for (kind, texts) in [("Problem", &capture.problems), ("Advice", &capture.faults), ("Note", &capture.notes)] {
         for text in texts {
             let _ = writeln!(html, "<p><b>{kind}:</b> {}</p>", escape(text));
         }
@@ -41,40 +41,39 @@ pub(super) fn section(capture: &CaptureSummary) -> String {
 }
 
 /// A page about a capture that is not trained yet: facts, cameras and points from above, `images` with their names, and
-/// how much each camera's image changes from one time to the next.
+/// for each camera how much its images change, and how sharp they are.
 ///
 /// # Errors
 /// [`DataError::Image`] if an image cannot be written as PNG.
 pub fn capture_page(
     scene: &Scene,
     capture: &CaptureSummary,
-    curves: &[ChangeCurve],
+    curves: &[CameraCurve],
     images: &[(String, RgbImage8)],
 ) -> Result<String, DataError> {
     let sections = [
         ("What was understood", section(capture)),
         ("Cameras and points from above", from_above(scene)),
         ("Images", contact_sheet(images)?),
-        ("Change from one frame to the next", charts(curves)),
+        ("Change from one image to the next", charts("Mean difference of gray values", curves, |curve| &curve.changes)),
+        ("Sharpness", charts("Detail at the size at which images are used", curves, |curve| &curve.sharpness)),
     ];
     let sections = sections.into_iter().filter(|(_, html)| !html.is_empty());
     let sections: Vec<(String, String)> = sections.map(|(heading, html)| (heading.to_owned(), html)).collect();
     Ok(page_of(&scene.name, &scene.root.display().to_string(), &sections))
 }
 
-fn charts(curves: &[ChangeCurve]) -> String {
-    let series = |curve: &ChangeCurve| Series {
-        label: curve.name.clone(),
-        mark: Mark::Line,
-        points: curve
-            .times
-            .iter()
-            .zip(&curve.changes)
-            .map(|(time, change)| ((*time).into(), (*change).into()))
-            .collect(),
+/// What each camera's images are like over time: `values` of a curve, the last of which belongs to its last image.
+fn charts(title: &str, curves: &[CameraCurve], values: impl Fn(&CameraCurve) -> &[f32]) -> String {
+    let series = |curve: &CameraCurve| {
+        let values = values(curve);
+        let times = &curve.times[curve.times.len() - values.len()..];
+        let points = times.iter().zip(values).filter(|(_, value)| value.is_finite());
+        let points = points.map(|(time, value)| ((*time).into(), (*value).into())).collect();
+        Series { label: curve.name.clone(), mark: Mark::Line, points }
     };
-    let chart = |group: &[ChangeCurve]| Chart {
-        title: "Mean difference of gray values".to_owned(),
+    let chart = |group: &[CameraCurve]| Chart {
+        title: title.to_owned(),
         x_label: "time".to_owned(),
         series: group.iter().map(series).collect(),
         logarithmic: false,

@@ -39,7 +39,7 @@ pub fn evaluate_run<F: DeformationField>(
         device: evaluation.device.clone(),
         summary: summary(&evaluation),
         advice: evaluation.advice.clone(),
-        capture: CaptureSummary::of(scene)?,
+        capture: folder.capture()?.map_or_else(|| CaptureSummary::of(scene), Ok)?,
         sections: evaluation.sections.clone(),
         player: player(folder, scene)?,
         coding: match &evaluation.coding {

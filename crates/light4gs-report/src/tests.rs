@@ -1,5 +1,5 @@
 use light4gs_data::{
-    CaptureFact, CaptureSummary, ChangeCurve, LoadOptions, RgbImage8, Scene, Split, SyntheticOptions, write_synthetic,
+    CameraCurve, CaptureFact, CaptureSummary, LoadOptions, RgbImage8, Scene, Split, SyntheticOptions, write_synthetic,
 };
 use light4gs_train::Stage;
 use light4gs_train::compression::{AttributeRecord, BitEstimate, PlaneRecord};
@@ -44,6 +44,7 @@ fn sample() -> Report {
         capture: CaptureSummary {
             facts: vec![CaptureFact { what: "times".into(), found: "9 from 0 to 1".into() }],
             notes: vec!["1 of 9 images is <missing>".into()],
+            faults: vec!["2 of 9 images are <blurred>".into()],
             problems: Vec::new(),
         },
         sections: vec![
@@ -187,19 +188,22 @@ fn a_capture_is_shown_before_it_is_trained() {
     let small = SyntheticOptions { resolution: 16, train_frames: 4, test_frames: 2, ..Default::default() };
     write_synthetic(&root, &small).unwrap();
     let scene = Scene::open(&root, &LoadOptions::default()).unwrap();
-    let curve = |i: u32| ChangeCurve {
+    let curve = |i: u32| CameraCurve {
         camera_id: i,
         name: format!("cam{i}"),
-        times: vec![0.5, 1.0],
+        times: vec![0.0, 0.5, 1.0],
+        sharpness: vec![0.6, f32::NAN, 0.5],
         changes: vec![0.01, 0.02],
+        log_gains: vec![0.0, 0.1],
+        ..CameraCurve::default()
     };
-    let curves: Vec<ChangeCurve> = (0..5).map(curve).collect();
+    let curves: Vec<CameraCurve> = (0..5).map(curve).collect();
     let capture = CaptureSummary::of(&scene).unwrap();
     let html = capture_page(&scene, &capture, &curves, &[("r & 0".into(), image(16, 16, 0))]).unwrap();
     assert_balanced(&html);
     for expected in ["4 to train on, 2 to test", "&lt;scene&gt;", "r &amp; 0", "cameras to train on", "cam4"] {
         assert!(html.contains(expected), "no {expected}");
     }
-    // Two charts of up to three curves.
-    assert_eq!(html.matches("class=\"chart\"").count(), 2);
+    // Two charts of up to three curves, of change and of sharpness.
+    assert_eq!(html.matches("class=\"chart\"").count(), 4);
 }

@@ -39,11 +39,14 @@ pub(super) fn kept_pixels(frame: &Frame, mask: &Mask) -> Result<PixelMask, DataE
     Ok(at_camera(frame, marks.into_iter().map(|value| u8::from(value != 0)).collect()))
 }
 
-/// Whether a frame's mask leaves no pixel to train on. What a mask says about motion hides nothing.
-pub(crate) fn masked_out(frame: &Frame) -> Result<bool, DataError> {
+/// The share of a frame's pixels that its mask keeps from being trained on. What a mask says about motion hides nothing.
+pub(crate) fn hidden_share(frame: &Frame) -> Result<f64, DataError> {
     match frame.mask.as_ref().filter(|mask| mask.zero == MaskMeaning::Ignored) {
-        None => Ok(false),
-        Some(mask) => Ok(!kept_pixels(frame, mask)?.pixels.contains(&1)),
+        None => Ok(0.0),
+        Some(mask) => {
+            let pixels = kept_pixels(frame, mask)?.pixels;
+            Ok(pixels.iter().filter(|kept| **kept == 0).count() as f64 / pixels.len() as f64)
+        }
     }
 }
 

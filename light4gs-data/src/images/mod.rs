@@ -17,7 +17,7 @@ pub use composite::{composite, composite_resized};
 pub use header::image_size;
 pub(crate) use header::{ImageHeader, read_headers, turns_sideways};
 pub use mask::PixelMask;
-pub(crate) use mask::{check_shape, masked_out, same_shape};
+pub(crate) use mask::{check_shape, hidden_share, same_shape};
 pub use region::{Region, regions};
 pub(crate) use rgb::save_png;
 pub use rgb::{RgbImage8, RgbImage32};

@@ -48,7 +48,7 @@ impl DatasetLayout for Nerfstudio {
             .iter()
             .map(|(_, path)| path.strip_prefix(root).unwrap_or(path).to_string_lossy().into_owned())
             .collect();
-        let Sequence { places, reading } = places_of(&file, &present, sequence(&relative, options))?;
+        let Sequence { places, mut reading } = places_of(&file, &present, sequence(&relative, options))?;
         let mut images = Vec::with_capacity(present.len());
         for ((((i, _), path), place), name) in present.iter().zip(&places).zip(frame_names(&relative)) {
             images.push(image(&file, *i, name, path, place)?);
@@ -56,7 +56,7 @@ impl DatasetLayout for Nerfstudio {
         if file.frames.iter().any(|entry| entry.get("mask_path").is_some_and(|path| !path.is_null())) {
             posed::note_unmasked(&images, &mut notes);
         }
-        posed::note_unposed(root, &images, &mut notes);
+        reading.unposed = posed::note_unposed(root, &images, &mut notes);
         let frames = posed::frames(&images, options, &mut notes)?;
         let splits = splits(&file, frames, &held_out(&places), &mut notes)?;
         let points = points(&file, &splits, options, &mut notes)?;

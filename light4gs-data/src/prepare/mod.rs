@@ -10,6 +10,7 @@ mod summary;
 mod tests;
 mod write;
 
+pub(crate) use poses::LEAST_REGISTERED;
 pub use summary::PrepareSummary;
 
 use crate::error::DataError;

@@ -8,6 +8,7 @@ use crate::error::DataError;
 use crate::images::image_size;
 use crate::layouts::colmap::{model::Model, read_model};
 use crate::layouts::shared::files;
+use crate::parallax::LEAST_PARALLAX;
 use crate::programs::colmap::{Colmap, Effort, FILM_AGAIN, Job, Mapper, Motion};
 use std::fs;
 use std::io::Write;
@@ -23,7 +24,7 @@ const PARTS: usize = 16;
 /// Images with a longer side below this number of pixels are doubled in size before features are searched.
 const SMALL: u32 = 800;
 /// If a smaller share of the images has a pose, there is a second attempt.
-pub(super) const LEAST_REGISTERED: f64 = 0.8;
+pub(crate) const LEAST_REGISTERED: f64 = 0.8;
 /// If so large a share of the pairs that moved shows nothing but a turn, and there are this many, and there is no model of a
 /// fair share of the images, the camera only turned.
 const TURNED: f64 = 0.5;
@@ -31,9 +32,6 @@ const LEAST_MOVED: usize = 8;
 const FAIR_SHARE: f64 = 0.4;
 /// A model with fewer points than this an image is none: COLMAP has guessed the poses.
 const LEAST_POINTS: usize = 8;
-/// With a smaller parallax, in degrees, there is no depth.
-pub(super) const LEAST_PARALLAX: f64 = 1.5;
-
 /// If more than this share only turned, cameras are placed all at once: that needs less parallax, and takes longer.
 const OFTEN_TURNED: f64 = 0.3;
 

@@ -97,17 +97,10 @@ fn middle(model: &Model) -> DVec3 {
     middle
 }
 
-/// The angle, in degrees, at which a point at the usual depth sees the two cameras that are farthest apart.
+/// See [`crate::parallax::parallax`].
 pub(super) fn parallax(model: &Model) -> f64 {
-    let centers = model.images.iter().map(|image| image.center);
-    let between = centers.clone().flat_map(|a| model.images.iter().map(move |b| a.distance(b.center)));
-    let extent = between.fold(0.0, f64::max);
-    let mean = centers.sum::<DVec3>() / model.images.len().max(1) as f64;
-    let mut depths: Vec<f64> =
-        model.points.positions.iter().map(|point| mean.distance(DVec3::from(point.map(f64::from)))).collect();
-    depths.sort_by(f64::total_cmp);
-    let depth = depths.get(depths.len() / 2).copied().unwrap_or(0.0);
-    if extent > 0.0 { (2.0 * (extent / (2.0 * depth)).atan()).to_degrees() } else { 0.0 }
+    let centers: Vec<DVec3> = model.images.iter().map(|image| image.center).collect();
+    crate::parallax::parallax(&centers, &model.points.positions)
 }
 
 /// COLMAP's world has an arbitrary origin, orientation and size. Turns the mean upward direction of the cameras to z,

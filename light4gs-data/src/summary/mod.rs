@@ -3,9 +3,11 @@
 mod unused;
 mod views;
 
+use crate::curves::CameraCurve;
 use crate::error::DataError;
+use crate::faults::capture_faults;
 use crate::frame::{Frame, MaskMeaning};
-use crate::images::masked_out;
+use crate::images::hidden_share;
 use crate::lens::Distortion;
 use crate::scene::{Scene, Split};
 use rayon::prelude::*;
@@ -16,6 +18,8 @@ use views::share_of_points_seen;
 
 /// Masks that are decoded to see whether they leave anything.
 const MASKS_READ: usize = 32;
+/// Masks that hide a larger share of the pixels are doubtful.
+const MOST_HIDDEN: f64 = 0.7;
 /// Steps of time longer than this many usual ones are gaps.
 const GAP: f32 = 1.5;
 
@@ -26,6 +30,9 @@ pub struct CaptureSummary {
     pub facts: Vec<CaptureFact>,
     /// Notes about reading the folder.
     pub notes: Vec<String>,
+    /// What makes the capture hard to learn from, and what to do.
+    #[serde(default)]
+    pub faults: Vec<String>,
     /// Why training could only fail; empty if it can work.
     pub problems: Vec<String>,
 }
@@ -45,7 +52,7 @@ impl CaptureSummary {
     /// # Errors
     /// [`DataError::Image`] if one of these masks cannot be read.
     pub fn of(scene: &Scene) -> Result<Self, DataError> {
-        let mut problems = Vec::new();
+        let (mut faults, mut problems) = (Vec::new(), Vec::new());
         let facts = [
             ("layout", format!("{}, {}", scene.layout, scene.root.display())),
             ("images", images(scene)),
@@ -53,13 +60,18 @@ impl CaptureSummary {
             ("cameras", cameras(scene)),
             ("lens", lenses(scene)),
             ("times", times(scene)),
-            ("masks", masks(scene, &mut problems)?),
+            ("masks", masks(scene, &mut faults, &mut problems)?),
             ("points", points(scene, &mut problems)),
             ("not used", unused(scene)),
         ];
         let facts = facts.into_iter().filter(|(_, found)| !found.is_empty());
         let facts = facts.map(|(what, found)| CaptureFact { what: what.to_owned(), found }).collect();
-        Ok(Self { facts, notes: scene.notes.clone(), problems })
+        Ok(Self { facts, notes: scene.notes.clone(), faults, problems })
+    }
+
+    /// Adds what poses and images show, see [`capture_faults`].
+    pub fn with_faults(self, scene: &Scene, curves: &[CameraCurve]) -> Self {
+        Self { faults: [self.faults, capture_faults(scene, curves)].concat(), ..self }
     }
 
     /// All facts on one line, for a log.
@@ -173,7 +185,7 @@ fn times(scene: &Scene) -> String {
     format!("{} from {first} to {last}{gaps}{source}", times.len())
 }
 
-fn masks(scene: &Scene, problems: &mut Vec<String>) -> Result<String, DataError> {
+fn masks(scene: &Scene, faults: &mut Vec<String>, problems: &mut Vec<String>) -> Result<String, DataError> {
     let masked: Vec<&Frame> = all(scene).filter(|frame| frame.mask.is_some()).collect();
     if masked.is_empty() {
         return Ok(String::new());
@@ -185,18 +197,26 @@ fn masks(scene: &Scene, problems: &mut Vec<String>) -> Result<String, DataError>
     };
     let meanings = listed(&counts(masked.iter().map(|frame| meaning(frame).to_owned())));
     let sample: Vec<&&Frame> = masked.iter().step_by(masked.len().div_ceil(MASKS_READ)).collect();
-    let hidden: Vec<bool> = sample.par_iter().map(|frame| masked_out(frame)).collect::<Result<_, _>>()?;
-    let empty = hidden.iter().filter(|hidden| **hidden).count();
-    let said = match empty {
-        0 => String::new(),
-        count if count == sample.len() => {
-            problems.push(format!(
-                "the masks hide every pixel, of all {count} that were looked at: where a mask is 0, nothing is trained; turn them round"
-            ));
-            ", which hides every pixel".to_owned()
-        }
-        count => format!(", every pixel of {count} of {} images that were looked at", sample.len()),
-    };
+    let hidden: Vec<f64> = sample.par_iter().map(|frame| hidden_share(frame)).collect::<Result<_, _>>()?;
+    let empty = hidden.iter().filter(|share| **share == 1.0).count();
+    let mean = hidden.iter().sum::<f64>() / hidden.len() as f64;
+    let mut said = String::new();
+    if mean > 0.0 {
+        said =
+            format!(", {:.0} % of the pixels of {} images that were looked at are hidden", 100.0 * mean, sample.len());
+    }
+    if empty == sample.len() {
+        problems.push(format!(
+            "the masks hide every pixel, of all {empty} that were looked at: where a mask is 0, nothing is trained; turn them round"
+        ));
+    } else if mean > MOST_HIDDEN || empty > 0 {
+        faults.push(format!(
+            "masks hide {:.0} % of the pixels, and all of {empty} of {} images that were looked at: where a mask is 0, nothing is \
+             trained; if they mark what shall be seen the other way round, turn them round",
+            100.0 * mean,
+            sample.len()
+        ));
+    }
     Ok(format!("{} of {} images, {meanings}{said}", masked.len(), all(scene).count()))
 }
 

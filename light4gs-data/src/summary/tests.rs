@@ -91,5 +91,8 @@ fn what_can_only_fail_is_a_problem() {
     let hidden = with_masks(|_| "black.png");
     assert!(hidden.problems[0].contains("hide every pixel"), "{hidden:?}");
     let some = with_masks(|i| if i == 3 { "black.png" } else { "white.png" });
-    assert!(some.problems.is_empty() && fact(&some, "masks").contains("every pixel of 1 of 9 images"), "{some:?}");
+    assert!(some.problems.is_empty() && fact(&some, "masks").contains("11 % of the pixels of 9 images"), "{some:?}");
+    assert!(some.faults.len() == 1 && some.faults[0].contains("all of 1 of 9 images"), "{some:?}");
+    let none = with_masks(|_| "white.png");
+    assert!(none.faults.is_empty() && !fact(&none, "masks").contains("hidden"), "{none:?}");
 }

@@ -16,15 +16,15 @@ const FULL: f64 = 0.98;
 /// The share of densification that must be spent at the limit.
 const LONG_FULL: f64 = 0.3;
 
-/// Advice for a run that comes out badly, from the PSNR of its test views (dB) and the records of its training; empty for a
-/// good one.
-pub(super) fn advice(config: &Config, test: f64, records: &[MetricsRecord]) -> Vec<String> {
+/// Advice for a run that comes out badly, from the PSNR of its test views (dB), the records of its training and the faults of
+/// its capture; empty for a good one.
+pub(super) fn advice(config: &Config, test: f64, records: &[MetricsRecord], faults: Vec<String>) -> Vec<String> {
     if test.is_nan() || test >= GOOD {
         return Vec::new();
     }
     let fine: Vec<&MetricsRecord> = records.iter().filter(|record| record.stage == Stage::Fine).collect();
     let rules = [still_rising(&fine), too_few_gaussians(config, &fine), not_confirmed(&fine, test)];
-    rules.into_iter().flatten().collect()
+    faults.into_iter().chain(rules.into_iter().flatten()).collect()
 }
 
 fn mean(values: impl Iterator<Item = f64>) -> Option<f64> {
@@ -93,7 +93,7 @@ mod tests {
                 record
             })
             .collect();
-        advice(&config, test, &records)
+        advice(&config, test, &records, Vec::new())
     }
 
     #[test]
@@ -110,5 +110,8 @@ mod tests {
         only(run(26.0, 500, |at| (28.0, 20.0 + 6.0 * at)), "schedule is short");
         only(run(26.0, 1000, |_| (28.0, 26.0)), "too few Gaussians");
         only(run(22.0, 500, |_| (31.0, 22.0)), "not confirmed");
+        let of_the_capture = |test| advice(&Config::default(), test, &[], vec!["blurred".into()]);
+        only(of_the_capture(25.0), "blurred");
+        assert_eq!(of_the_capture(35.0), Vec::<String>::new());
     }
 }

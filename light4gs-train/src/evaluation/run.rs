@@ -37,7 +37,8 @@ pub fn measure_run<F: DeformationField>(
     let metrics = read_metrics(&folder.path("metrics.jsonl"))?;
     evaluation.training_seconds = metrics.last().map(|record| record.seconds);
     if let Some(test) = evaluation.splits.iter().find(|split| split.split == Split::Test.name()) {
-        evaluation.advice = advice(config, test.scores.psnr(), &metrics);
+        let faults = folder.capture()?.unwrap_or_default().faults;
+        evaluation.advice = advice(config, test.scores.psnr(), &metrics, faults);
     }
     evaluation.coding = folder.read_json("coding.json")?;
     folder.write_json("eval.json", &evaluation)?;

@@ -139,6 +139,14 @@ impl RunFolder {
         self.write_json(RECORD, &RunRecord { capture: Some(capture), ..record })
     }
 
+    /// What the run's dataset was taken for when the run began; `None` where that was not recorded.
+    ///
+    /// # Errors
+    /// [`TrainError`] if the record is damaged.
+    pub fn capture(&self) -> Result<Option<CaptureSummary>, TrainError> {
+        Ok(self.read_json::<RunRecord>(RECORD)?.and_then(|record| record.capture))
+    }
+
     /// Refuses a folder in which no new run may be made; returns its contents.
     fn allow_new_run(&self, overwrite: bool) -> Result<Contents, TrainError> {
         let root = self.root.display();

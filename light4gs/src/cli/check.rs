@@ -5,17 +5,18 @@ use std::path::{Path, PathBuf};
 use clap::Args;
 use clap::builder::PossibleValuesParser;
 use light4gs_data::{
-    CaptureSummary, ChangeCurve, DataError, Layouts, RgbImage8, Scene, change_curves, out_of_step, write_atomically,
+    CameraCurve, CaptureSummary, DataError, Layouts, RgbImage8, Scene, camera_curves, write_atomically,
 };
 use light4gs_report::capture_page;
 use light4gs_train::config::Config;
 use light4gs_train::dataset::{image_store, load_options};
 use light4gs_train::error::TrainError;
 use light4gs_train::table::{Align, Table};
+use serde::Serialize;
 
 use super::output::{say, say_json, tell};
 
-/// Images that are decoded for the curves of change.
+/// Images that are looked at.
 const CURVE_IMAGES: usize = 240;
 /// Images of the contact sheet.
 const SHEET_IMAGES: usize = 24;
@@ -40,6 +41,15 @@ pub(super) struct Check {
     json: bool,
 }
 
+/// What `--json` prints.
+#[derive(Serialize)]
+struct Checked<'a> {
+    #[serde(flatten)]
+    capture: &'a CaptureSummary,
+    /// What the images of each camera are like over time.
+    cameras: &'a [CameraCurve],
+}
+
 impl Check {
     pub(super) fn run(self) -> Result<(), TrainError> {
         if let Some(page) = &self.html {
@@ -54,16 +64,16 @@ impl Check {
         overrides.push(format!("data.layout={}", layout.name()));
         let config = Config::load(Config::preset_of(layout)?, &overrides)?;
         let scene = Scene::open(&self.scene, &load_options(&config))?;
-        let (capture, curves) = understand(&config, &scene, Curves::All)?;
+        let (capture, curves) = understand(&config, &scene)?;
         if let Some(page) = &self.html {
             let html = capture_page(&scene, &capture, &curves, &contact_sheet(&config, &scene)?)?;
             write_atomically(page, |out| std::io::Write::write_all(out, html.as_bytes()))?;
         }
         if self.json {
-            say_json(&capture)?;
+            say_json(&Checked { capture: &capture, cameras: &curves })?;
         } else {
             say(table(&capture))?;
-            capture.notes.iter().try_for_each(|note| say(format_args!("note: {note}")))?;
+            remarks(&capture).try_for_each(say)?;
             if let Some(page) = &self.html {
                 say(format_args!("page: {}", page.display()))?;
             }
@@ -72,38 +82,10 @@ impl Check {
     }
 }
 
-/// Which curves of change are made. Images are decoded for them.
-#[derive(Clone, Copy, PartialEq, Eq)]
-pub(super) enum Curves {
-    /// Those of several cameras, to compare them.
-    OfRigs,
-    /// Those of a single camera, too, to be looked at.
-    All,
-}
-
-/// What a dataset is taken for, with a note for each camera that is out of step, and the curves that show it.
-pub(super) fn understand(
-    config: &Config,
-    scene: &Scene,
-    wanted: Curves,
-) -> Result<(CaptureSummary, Vec<ChangeCurve>), TrainError> {
-    let mut capture = CaptureSummary::of(scene)?;
-    let single = scene.train.iter().all(|frame| frame.camera_id == scene.train[0].camera_id);
-    if single && wanted == Curves::OfRigs {
-        return Ok((capture, Vec::new()));
-    }
-    let curves = change_curves(scene, &image_store(config), CURVE_IMAGES)?;
-    for camera in out_of_step(&curves) {
-        let name = curves.iter().find(|curve| curve.camera_id == camera.camera_id).map_or("", |curve| &curve.name);
-        let (frames, way) =
-            (camera.frames_ahead.unsigned_abs(), if camera.frames_ahead > 0 { "ahead of" } else { "behind" });
-        capture.notes.push(format!(
-            "camera {name} is {frames} frames {way} the others: its images change as theirs do then (correlation {:.2}, {:.2} \
-             as they are); --set data.synchronize=true moves its times",
-            camera.correlation, camera.unshifted
-        ));
-    }
-    Ok((capture, curves))
+/// What a dataset is taken for, with its faults, and the curves that show them. Images are decoded for it.
+pub(super) fn understand(config: &Config, scene: &Scene) -> Result<(CaptureSummary, Vec<CameraCurve>), TrainError> {
+    let curves = camera_curves(scene, &image_store(config), CURVE_IMAGES)?;
+    Ok((CaptureSummary::of(scene)?.with_faults(scene, &curves), curves))
 }
 
 /// Prints what a dataset is taken for: a table on a terminal, a line on a log.
@@ -113,9 +95,13 @@ pub(super) fn tell_capture(capture: &CaptureSummary) {
     } else {
         tell(format_args!("capture: {}", capture.line()));
     }
-    for note in &capture.notes {
-        tell(format_args!("note: {note}"));
-    }
+    remarks(capture).for_each(tell);
+}
+
+/// Notes and faults, one on a line.
+fn remarks(capture: &CaptureSummary) -> impl Iterator<Item = String> {
+    let kinds = [("note", &capture.notes), ("advice", &capture.faults)];
+    kinds.into_iter().flat_map(|(kind, texts)| texts.iter().map(move |text| format!("{kind}: {text}")))
 }
 
 /// An error where training could only fail.

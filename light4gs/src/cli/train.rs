@@ -19,7 +19,7 @@ use light4gs_train::run::{RunFolder, RunRecord};
 use light4gs_train::table::{Align, Table};
 use light4gs_train::trainer::{Trainer, TrainerBuilder};
 
-use super::check::{Curves, refuse_problems, tell_capture, understand};
+use super::check::{refuse_problems, tell_capture, understand};
 use super::limits::LimitsArgument;
 use super::output::progress::ProgressBars;
 use super::output::{say, say_json, tell};
@@ -106,7 +106,7 @@ pub(super) fn train(
     // From here on requests to stop are noticed.
     stop_flag();
     let data = check_inputs(&config, scene)?;
-    let (capture, _) = understand(&config, &data, Curves::OfRigs)?;
+    let (capture, _) = understand(&config, &data)?;
     tell_capture(&capture);
     refuse_problems(scene, &capture)?;
     // If the encoder would refuse the scene, for example for a point at 3e38, the run that --overwrite replaces must

@@ -388,8 +388,8 @@ fn a_dataset_that_cannot_be_coded_costs_no_run() {
     }
     let properties = ["x", "y", "z"].map(|axis| format!("property float {axis}\n")).concat();
     let points = |first: &str| {
-        let rows: String = (0..20).map(|i| format!("0.{i} 0.1 0.2\n")).collect();
-        format!("ply\nformat ascii 1.0\nelement vertex 21\n{properties}end_header\n{first} 0 0\n{rows}")
+        let rows: String = (0..20).map(|i| format!("{first} 0.{i} 0.2\n")).collect();
+        format!("ply\nformat ascii 1.0\nelement vertex 20\n{properties}end_header\n{rows}")
     };
     let refused = |first: &str, focal: f64, x: f64, words: &[&str]| {
         let mut frames = frames.clone();
@@ -405,7 +405,7 @@ fn a_dataset_that_cannot_be_coded_costs_no_run() {
         assert_refused(&command.arg("--overwrite").output().unwrap(), words);
         assert_eq!(w.names("run"), before);
     };
-    refused("3e38", 40.0, 1.0, &["point cloud", "3e38"]);
+    refused("3e38", 40.0, 1.0, &["scene", "none of 20 points"]);
     refused("0.1", 40.0, 1e20, &["transforms.json", "frames[0]", "world units"]);
     refused("0.1", 1e-30, 1.0, &["transforms.json", "focal length"]);
 }
@@ -449,7 +449,8 @@ fn a_dataset_that_changed_is_noticed() {
         assert_refused(&resume(&[]), &["scene", word, "--accept-changed-dataset"]);
     }
     edit(&|json| {
-        let first = frames(json)[0].clone();
+        let mut first = frames(json)[0].clone();
+        first["time"] = 0.377.into();
         json["frames"].as_array_mut().unwrap().push(first);
     });
     assert_refused(&resume(&[]), &["added"]);

@@ -49,13 +49,14 @@ impl DatasetLayout for Colmap {
         let model = largest_model(root, &mut notes)?;
         let images_folder = find_images(root, &model)?;
         let posed = posed_images(&model, &images_folder, &mut notes)?;
-        posed::note_unposed(&images_folder, &posed, &mut notes);
+        let unposed = posed::note_unposed(&images_folder, &posed, &mut notes);
         if root.join("masks").is_dir() {
             notes.push("the folder masks/ is not read: COLMAP's masks hide what moves; to hide pixels from training, name masks in \
                         a transforms.json (mask_path), see docs/data.md".to_owned());
         }
         let names: Vec<String> = posed.iter().map(|image| image.name.clone()).collect();
-        let Sequence { places, reading } = sequence(&names, options);
+        let Sequence { places, mut reading } = sequence(&names, options);
+        reading.unposed = unposed;
         let mut posed = posed;
         for (image, place) in posed.iter_mut().zip(&places) {
             (image.camera_id, image.time) = (place.camera, place.time);

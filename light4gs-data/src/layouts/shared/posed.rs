@@ -157,8 +157,8 @@ fn note_rotations(images: &[PosedImage], headers: &[ImageHeader], sizes: &[(u32,
     }
 }
 
-/// Says how many images in the folders of the posed ones have no pose.
-pub(in crate::layouts) fn note_unposed(folder: &Path, posed: &[PosedImage], notes: &mut Vec<String>) {
+/// How many images in the folders of the posed ones have no pose, with a note if there are any.
+pub(in crate::layouts) fn note_unposed(folder: &Path, posed: &[PosedImage], notes: &mut Vec<String>) -> usize {
     let known: HashSet<&Path> = posed.iter().map(|image| image.path.as_path()).collect();
     let folders: HashSet<&Path> = posed.iter().filter_map(|image| image.path.parent()).collect();
     let images = folders.iter().flat_map(|folder| files::images(folder).unwrap_or_default());
@@ -167,6 +167,7 @@ pub(in crate::layouts) fn note_unposed(folder: &Path, posed: &[PosedImage], note
         let (folder, all) = (folder.display(), unposed + posed.len());
         notes.push(format!("{unposed} of the {all} images in {folder} have no pose and are left out"));
     }
+    unposed
 }
 
 /// Adds a note with the number of images without a mask, where a capture has masks.

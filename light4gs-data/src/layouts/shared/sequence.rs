@@ -99,7 +99,7 @@ pub(in crate::layouts) fn sequence(names: &[String], options: &LoadOptions) -> S
         (count, CamerasFrom::Folder) => format!("{count}, one a folder"),
         (count, _) => format!("{count}, by the text of the images' names and folders beside what counts the time"),
     };
-    Sequence { places, reading: Reading { cameras, times: times.to_owned() } }
+    Sequence { places, reading: Reading { cameras, times: times.to_owned(), unposed: 0 } }
 }
 
 /// Whether moments in names are meant as such. A time of day without a date is one only where it runs on: cameras that are
