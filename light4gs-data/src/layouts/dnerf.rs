@@ -75,7 +75,11 @@ fn points(root: &Path, options: &LoadOptions) -> Result<PointCloud, DataError> {
     let found = ["points3d.ply", "fused.ply"].iter().map(|name| root.join(name)).find(|path| path.is_file());
     match found {
         Some(path) => PointCloud::read_ply(&path),
-        None => Ok(PointCloud::random(options.random_points, options.random_half_size, options.seed)),
+        None => Ok(PointCloud::random(
+            options.random_points.min(options.most_points),
+            options.random_half_size,
+            options.seed,
+        )),
     }
 }
 
@@ -193,14 +197,8 @@ impl Split {
 
 fn read_time(file: &Transforms, i: usize) -> Result<f64, DataError> {
     let field = format!("frames[{i}].time");
-    let expected = "a finite number of at least 0";
     let remedy = "give every frame its time (a static scene has 0 everywhere)";
-    let time = json::finite(&file.path, &field, file.frames[i].get("time"), expected, remedy)?;
-    if time < 0.0 {
-        let problem = format!("{time}, expected {expected}");
-        return Err(DataError::field(&file.path, field, problem, "shift the times so that the first is 0"));
-    }
-    Ok(time)
+    json::finite(&file.path, &field, file.frames[i].get("time"), "a finite number", remedy)
 }
 
 /// The image of a frame: `file_path` itself, or with an extension added.

@@ -32,7 +32,7 @@ impl PointCloud {
     /// options.
     pub(crate) fn in_front_of(frames: &[Frame], options: &LoadOptions) -> Self {
         let (center, half) = seen(frames).unwrap_or((DVec3::ZERO, options.random_half_size.into()));
-        let mut cloud = Self::random(options.random_points, half as f32, options.seed);
+        let mut cloud = Self::random(options.random_points.min(options.most_points), half as f32, options.seed);
         for position in &mut cloud.positions {
             for (value, shift) in position.iter_mut().zip(center.to_array()) {
                 *value += shift as f32;

@@ -81,6 +81,9 @@ impl Phases {
         match event {
             PrepareEvent::Note(note) => self.bar.suspend(|| tell(format_args!("note: {note}"))),
             _ if self.quiet => {}
+            // Once more the end of a phase that has had its line.
+            PrepareEvent::Progress { phase, done, total }
+                if done == total && phase == self.phase && self.said.is_none() => {}
             PrepareEvent::Progress { phase, done, total } => {
                 if phase != self.phase || self.said.is_none() {
                     self.begin(phase, total);

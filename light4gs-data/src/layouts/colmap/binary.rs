@@ -1,8 +1,7 @@
 //! COLMAP's binary files: `cameras.bin`, `images.bin`, `points3D.bin`, little endian.
 
-use super::model::{ModelCamera, ModelImage, REMEDY, model_of_number, unknown_model};
+use super::model::{ModelCamera, ModelImage, ModelPoints, REMEDY, model_of_number, unknown_model};
 use crate::error::DataError;
-use crate::points::PointCloud;
 use crate::regular_file::read_regular_file;
 use std::collections::HashMap;
 use std::path::Path;
@@ -131,12 +130,11 @@ pub(super) fn images(path: &Path) -> Result<Vec<ModelImage>, DataError> {
     Ok(images)
 }
 
-/// The points, and their mean reprojection error in pixels.
-pub(super) fn points(path: &Path) -> Result<(PointCloud, Option<f64>), DataError> {
+/// The points. Those that are not finite are counted and left out.
+pub(super) fn points(path: &Path) -> Result<ModelPoints, DataError> {
     let mut file = Reader::open(path)?;
     let count = file.count("number of points", 51)?;
-    let mut cloud = PointCloud::default();
-    let mut errors = 0.0;
+    let mut points = ModelPoints::default();
     for i in 0..count {
         let field = format!("point {i}");
         file.u64(&field)?;
@@ -146,12 +144,13 @@ pub(super) fn points(path: &Path) -> Result<(PointCloud, Option<f64>), DataError
         let track = file.count(&format!("{field}, length of the track"), 8)?;
         file.take(8 * track, &field)?;
         if position.iter().all(|v| v.is_finite()) {
-            cloud.positions.push(position);
-            cloud.colors.push(color);
-            errors += error;
+            points.cloud.positions.push(position);
+            points.cloud.colors.push(color);
+            points.errors += error;
+        } else {
+            points.not_finite += 1;
         }
     }
     file.end()?;
-    let mean = (!cloud.is_empty()).then(|| errors / cloud.len() as f64);
-    Ok((cloud, mean))
+    Ok(points)
 }

@@ -19,7 +19,7 @@ use crate::error::DataError;
 use crate::options::LoadOptions;
 use crate::points::PointCloud;
 use crate::scene::{Scene, SplitFrames};
-use model::Model;
+use model::{Model, ModelPoints};
 use std::path::{Path, PathBuf};
 
 /// Folders that are tried, in this order. Each may hold a model, or folders `0`, `1`... with one model each.
@@ -49,6 +49,12 @@ impl DatasetLayout for Colmap {
         let model = largest_model(root, &mut notes)?;
         let images_folder = find_images(root, &model)?;
         let posed = posed_images(&model, &images_folder, &mut notes)?;
+        if model.points_not_finite > 0 {
+            notes.push(format!(
+                "{} points of the model are at no finite place and are left out",
+                model.points_not_finite
+            ));
+        }
         let unposed = posed::note_unposed(&images_folder, &posed, &mut notes);
         if root.join("masks").is_dir() {
             notes.push("the folder masks/ is not read: COLMAP's masks hide what moves; to hide pixels from training, name masks in \
@@ -161,8 +167,8 @@ pub(crate) fn read_model(folder: &Path) -> Result<Model, DataError> {
         (text::cameras(&file("cameras"))?, text::images(&images_file)?)
     };
     let points_file = file("points3D");
-    let (points, error) = match (points_file.is_file(), is_binary) {
-        (false, _) => (PointCloud::default(), None),
+    let ModelPoints { cloud: points, errors, not_finite } = match (points_file.is_file(), is_binary) {
+        (false, _) => ModelPoints::default(),
         (true, true) => binary::points(&points_file)?,
         (true, false) => text::points(&points_file)?,
     };
@@ -175,7 +181,8 @@ pub(crate) fn read_model(folder: &Path) -> Result<Model, DataError> {
         let problem = format!("image `{name}` is of camera {camera}, which {} lacks", file("cameras").display());
         return Err(DataError::field(&images_file, "camera", problem, "take both files from the same model"));
     }
-    Ok(Model { cameras, images, points, error, images_file })
+    let error = (!points.is_empty()).then(|| errors / points.len() as f64);
+    Ok(Model { cameras, images, points, error, points_not_finite: not_finite, images_file })
 }
 
 /// The folder that has most of the model's images.

@@ -30,6 +30,16 @@ pub(crate) struct ModelImage {
     pub(crate) camera: u32,
 }
 
+/// The points of a model.
+#[derive(Debug, Default)]
+pub(super) struct ModelPoints {
+    pub(super) cloud: PointCloud,
+    /// The sum of their reprojection errors, pixels.
+    pub(super) errors: f64,
+    /// Points without a place, which are not in the cloud.
+    pub(super) not_finite: usize,
+}
+
 /// A sparse model.
 #[derive(Debug)]
 pub(crate) struct Model {
@@ -40,6 +50,8 @@ pub(crate) struct Model {
     pub(crate) points: PointCloud,
     /// Mean reprojection error of the points, pixels; `None` without points.
     pub(crate) error: Option<f64>,
+    /// Points without a place, which are not in the cloud.
+    pub(crate) points_not_finite: usize,
     /// The file of the images, for messages.
     pub(crate) images_file: PathBuf,
 }

@@ -1,9 +1,8 @@
 //! COLMAP's text files: `cameras.txt`, `images.txt`, `points3D.txt`.
 
-use super::model::{ModelCamera, ModelImage, REMEDY, model_of_name, unknown_model};
+use super::model::{ModelCamera, ModelImage, ModelPoints, REMEDY, model_of_name, unknown_model};
 use crate::error::DataError;
 use crate::layouts::shared::files::shorten;
-use crate::points::PointCloud;
 use crate::regular_file::read_regular_text;
 use std::collections::HashMap;
 use std::path::Path;
@@ -115,21 +114,21 @@ fn check_keypoints(line: &Line) -> Result<(), DataError> {
     Err(DataError::field(line.path, line.field(), problem, remedy))
 }
 
-/// The points, and their mean reprojection error in pixels.
-pub(super) fn points(path: &Path) -> Result<(PointCloud, Option<f64>), DataError> {
+/// The points. Those that are not finite are counted and left out.
+pub(super) fn points(path: &Path) -> Result<ModelPoints, DataError> {
     let text = read(path)?;
-    let mut cloud = PointCloud::default();
-    let mut errors = 0.0;
+    let mut points = ModelPoints::default();
     for (_, line) in lines(path, &text).filter(|(_, line)| !line.words.is_empty()) {
         let line = line.at_least(8, "POINT3D_ID X Y Z R G B ERROR TRACK[]")?;
         let [x, y, z, r, g, b, error] = line.floats(1)?;
         let position = [x, y, z].map(|v| v as f32);
         if position.iter().all(|v| v.is_finite()) {
-            cloud.positions.push(position);
-            cloud.colors.push([r, g, b].map(|v| (v / 255.0).clamp(0.0, 1.0) as f32));
-            errors += error;
+            points.cloud.positions.push(position);
+            points.cloud.colors.push([r, g, b].map(|v| (v / 255.0).clamp(0.0, 1.0) as f32));
+            points.errors += error;
+        } else {
+            points.not_finite += 1;
         }
     }
-    let mean = (!cloud.is_empty()).then(|| errors / cloud.len() as f64);
-    Ok((cloud, mean))
+    Ok(points)
 }

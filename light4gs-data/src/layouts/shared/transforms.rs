@@ -149,14 +149,17 @@ impl Transforms {
         let model = model.filter(|model| !model.is_null());
         // nerfstudio's `k4` is the next term of the polynomial. OpenCV's is in the denominator, in a model that always
         // has `k5` and `k6`.
-        let divides = k[4] != 0.0 || k[5] != 0.0 || model.is_some_and(|model| model == "FULL_OPENCV");
+        let divides = k[4] != 0.0
+            || k[5] != 0.0
+            || model.and_then(Value::as_str).is_some_and(|model| model.eq_ignore_ascii_case("FULL_OPENCV"));
         let perspective = if divides || k[3] == 0.0 {
             Distortion::RadialTangential { radial: k, tangential }
         } else {
             Distortion::BrownConrady { radial: [k[0], k[1], k[2], k[3]], tangential }
         };
         let fisheye = matches!(self.value(i, "is_fisheye").1, Some(Value::Bool(true)));
-        let distortion = match model.map(|model| model.as_str().unwrap_or("")) {
+        let name = model.map(|model| model.as_str().unwrap_or("").to_ascii_uppercase());
+        let distortion = match name.as_deref() {
             None if !fisheye => perspective,
             Some(name) if PINHOLES.contains(&name) => perspective,
             None | Some("OPENCV_FISHEYE") => Distortion::Fisheye { radial: [k[0], k[1], k[2], k[3]] },

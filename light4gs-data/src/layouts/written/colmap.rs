@@ -31,7 +31,7 @@ fn pose(shot: &Shot) -> [f64; 7] {
     [q.w, q.x, q.y, q.z, t.x, t.y, t.z].map(f64::from)
 }
 
-fn write_images(root: &Path, capture: &Capture) {
+pub(super) fn write_images(root: &Path, capture: &Capture) {
     for (i, shot) in capture.shots.iter().enumerate() {
         let path = root.join(format!("images/{}.png", shot.name));
         fs::create_dir_all(path.parent().unwrap()).unwrap();
@@ -40,7 +40,7 @@ fn write_images(root: &Path, capture: &Capture) {
     fs::create_dir_all(root.join("sparse/0")).unwrap();
 }
 
-fn write_text(root: &Path, capture: &Capture) {
+pub(super) fn write_text(root: &Path, capture: &Capture) {
     let (mut cameras, mut images) = ("# cameras\n".to_owned(), "# images\n".to_owned());
     for (i, shot) in capture.shots.iter().enumerate() {
         let (_, model, values) = parameters(shot);
@@ -58,7 +58,7 @@ fn write_text(root: &Path, capture: &Capture) {
         .unwrap();
 }
 
-fn write_binary(root: &Path, capture: &Capture) {
+pub(super) fn write_binary(root: &Path, capture: &Capture) {
     let count = (capture.shots.len() as u64).to_le_bytes();
     let (mut cameras, mut images) = (count.to_vec(), count.to_vec());
     let floats = |values: &[f64]| -> Vec<u8> { values.iter().flat_map(|v| v.to_le_bytes()).collect() };
@@ -183,6 +183,12 @@ fn damaged_models_are_named() {
     changed("images.txt", " 0 frame_0000", " 17 frame_0000", &["image `frame_0000.png` is of camera 17"]);
     changed("images.txt", "frame_0000", "../../frame_0000", &["leads out"]);
     changed("points3D.txt", "0.25 -0.5", "NaNN -0.5", &["line 2", "NaNN"]);
+    write_text(root, &capture);
+    let points = root.join("sparse/0/points3D.txt");
+    let text = fs::read_to_string(&points).unwrap();
+    fs::write(&points, text.replacen("0.25 -0.5", "nan -0.5", 1)).unwrap();
+    let notes = Scene::open(root, &options()).unwrap().notes;
+    assert!(notes.iter().any(|note| note.starts_with("1 points of the model are at no finite place")), "{notes:?}");
     write_text(root, &capture);
     fs::write(root.join("sparse/0/images.txt"), "# nothing\n").unwrap();
     refuses(root, &["images.txt", "0 posed images"]);

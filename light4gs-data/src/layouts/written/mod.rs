@@ -3,6 +3,7 @@
 
 mod capture;
 mod colmap;
+mod damaged;
 mod dnerf;
 mod nerfies;
 mod nerfstudio;

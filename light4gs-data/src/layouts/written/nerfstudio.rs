@@ -27,7 +27,7 @@ pub(super) fn intrinsics(shot: &Shot) -> Value {
 }
 
 /// The document with intrinsics at the top, or in every frame.
-fn document(capture: &Capture, shared: bool) -> Value {
+pub(super) fn document(capture: &Capture, shared: bool) -> Value {
     let mut top = if shared { intrinsics(&capture.shots[0]) } else { json!({}) };
     let frames: Vec<Value> = capture
         .shots
@@ -54,7 +54,7 @@ pub(super) fn write_images(root: &Path, capture: &Capture) {
     }
 }
 
-fn write(root: &Path, capture: &Capture, document: &Value) {
+pub(super) fn write(root: &Path, capture: &Capture, document: &Value) {
     write_images(root, capture);
     fs::write(root.join("transforms.json"), document.to_string()).unwrap();
 }
@@ -147,7 +147,7 @@ fn the_fourth_coefficient_continues_the_polynomial() {
     for (key, value) in [("k1", -0.1), ("k2", 0.05), ("k3", 0.02), ("k4", 0.4), ("p1", 0.001), ("p2", -0.002)] {
         document[key] = json!(value);
     }
-    for model in [json!("OPENCV"), json!(null)] {
+    for model in [json!("OPENCV"), json!("opencv"), json!(null)] {
         document["camera_model"] = model;
         write(folder.path(), &capture, &document);
         let scene = check(folder.path(), "nerfstudio", &capture, by_name(&capture.shots));

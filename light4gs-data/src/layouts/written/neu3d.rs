@@ -27,14 +27,14 @@ fn row(shot: &Shot) -> Vec<f64> {
     row
 }
 
-fn rig(cameras: usize, instants: usize) -> Capture {
+pub(super) fn rig(cameras: usize, instants: usize) -> Capture {
     let plan = (0..cameras).flat_map(|c| {
         (0..instants).map(move |i| (format!("cam{c:02}_{i:04}"), c as f32 / 3.0, i as f32 / instants as f32, None))
     });
     Capture::new(true, plan.collect())
 }
 
-fn write(root: &Path, capture: &Capture, instants: usize) {
+pub(super) fn write(root: &Path, capture: &Capture, instants: usize) {
     let mut table = Vec::new();
     for (i, shot) in capture.shots.iter().enumerate() {
         let (camera, instant) = (i / instants, i % instants);
