@@ -34,21 +34,26 @@ pub(super) fn dataset(
     // Frames of a single camera have the times at which they are shown. Those of a rig were taken evenly.
     let shown = Taken::read(&options.out.join("images"), count).filter(|_| cameras.len() == 1);
     let seconds = shown.map_or_else(|| (0..count).map(|i| i as f64).collect(), |taken| taken.seconds);
-    let last = seconds.last().copied().filter(|last| *last > 0.0).unwrap_or(1.0);
-    let mut frames = Vec::new();
+    let mut placed = Vec::new();
     let mut used = 0;
     for list in &lists {
         // A camera that stands still has the pose of its first frame.
         let of_camera = list.first().and_then(|name| posed.get(name.as_str()));
-        let before = frames.len();
-        for (i, name) in list.iter().enumerate() {
+        let before = placed.len();
+        for (name, seconds) in list.iter().zip(&seconds) {
             let image = if stands { of_camera } else { posed.get(name.as_str()) };
-            if let Some(image) = image {
-                frames.push(frame(name, seconds[i] / last, image, &model.cameras[&image.camera]));
-            }
+            placed.extend(image.map(|image| (name, *seconds, *image)));
         }
-        used += usize::from(frames.len() > before);
+        used += usize::from(placed.len() > before);
     }
+    // From the first frame with a pose to the last: nothing shows the time before and after.
+    let times = || placed.iter().map(|(_, seconds, _)| *seconds);
+    let (first, last) = (times().fold(f64::INFINITY, f64::min), times().fold(f64::NEG_INFINITY, f64::max));
+    let span = if last > first { last - first } else { 1.0 };
+    let frames: Vec<Value> = placed
+        .iter()
+        .map(|(name, seconds, image)| frame(name, (seconds - first) / span, image, &model.cameras[&image.camera]))
+        .collect();
     let summary = PrepareSummary {
         images: wanted,
         registered,
@@ -120,5 +125,45 @@ fn normalize(model: &mut Model) {
     for position in &mut model.points.positions {
         let moved = turn * (DVec3::from(position.map(f64::from)) - middle) * scale;
         *position = moved.as_vec3().to_array();
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::{Intrinsics, PointCloud, RgbImage8};
+
+    /// The first and the last of six frames have no pose, so time runs from the second to the fifth.
+    #[test]
+    fn times_are_those_of_frames_with_a_pose() {
+        let folder = tempfile::tempdir().unwrap();
+        let out = folder.path().join("out");
+        std::fs::create_dir_all(out.join("images")).unwrap();
+        for i in 0..6 {
+            let image = RgbImage8 { width: 8, height: 8, pixels: vec![9; 192] };
+            image.save_png(&out.join(format!("images/{i:04}.png"))).unwrap();
+        }
+        let image = |i: u32| ModelImage {
+            name: format!("{i:04}.png"),
+            rotation: DMat3::IDENTITY,
+            center: DVec3::new(f64::from(i), 0.0, -4.0),
+            camera: 1,
+        };
+        let intrinsics = Intrinsics { width: 8, height: 8, fx: 9.0, fy: 9.0, cx: 4.0, cy: 4.0 };
+        let model = Model {
+            cameras: [(1, ModelCamera { intrinsics, lens: None })].into(),
+            images: (1..5).map(image).collect(),
+            points: PointCloud { positions: vec![[0.0; 3], [1.0; 3]], colors: vec![[0.5; 3]; 2] },
+            error: Some(0.5),
+            points_not_finite: 0,
+            images_file: out.join("images.bin"),
+        };
+        let options = PrepareOptions::new(vec![folder.path().join("a.mp4")], out.clone());
+        let summary = dataset(&options, &[String::new()], model, Vec::new()).unwrap();
+        assert_eq!((summary.images, summary.registered, summary.frames, summary.cameras), (6, 4, 4, 1));
+        let text = std::fs::read_to_string(out.join("transforms.json")).unwrap();
+        let document: Value = serde_json::from_str(&text).unwrap();
+        let times = document["frames"].as_array().unwrap().iter().map(|frame| frame["time"].as_f64().unwrap());
+        assert!(times.zip([0.0, 1.0 / 3.0, 2.0 / 3.0, 1.0]).all(|(found, expected)| (found - expected).abs() < 1e-12));
     }
 }

@@ -1,20 +1,7 @@
 //! Exposures: a gain and an offset of each color channel.
 
 use burn::tensor::Tensor;
-use light4gs_keys::choice;
 use serde::Serialize;
-
-choice! {
-    /// What has an exposure of its own.
-    pub enum ExposureUnit: "unit of exposure" {
-        /// Nothing: images are compared as they are.
-        None = "none",
-        /// Each camera of a rig.
-        Camera = "camera",
-        /// Each frame.
-        Frame = "frame",
-    }
-}
 
 /// Largest logarithm of a gain, either way: a factor of 4.
 const MOST_LOG_GAIN: f32 = 1.386_294_4;

@@ -11,6 +11,7 @@
 //! | `rows` | a few numbers for each of several units, with their optimizer |
 //! | `exposure` | a gain and an offset of each color channel |
 //! | `poses` | a small turn and translation of a camera |
+//! | `unit` | what has a correction of its own |
 //! | `view` | the corrections of one view, on the tape |
 //! | `fit` | the same few numbers fitted to a view that was not trained on |
 
@@ -18,21 +19,23 @@ mod exposure;
 mod fit;
 mod poses;
 mod rows;
+mod unit;
 mod view;
 
 #[cfg(test)]
 mod tests;
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 
 use light4gs_data::{Frame, Scene};
 use light4gs_keys::Bounds::{Flag, Number};
 use light4gs_keys::{ITERATION, WEIGHT, keys};
 use serde::Serialize;
 
-pub use exposure::{Exposure, ExposureUnit, exposed};
+pub use exposure::{Exposure, exposed};
 pub use fit::{Fitted, ViewFit};
 pub use poses::Pose;
+pub use unit::CorrectionUnit;
 pub use view::{GradientOfView, LearnedView, ViewCorrection};
 
 use crate::optimization::schedule::ExponentialDecay;
@@ -46,9 +49,10 @@ keys! {
     /// What is corrected.
     pub struct CorrectionsConfig {
         /// What has a gain and an offset of its own for each color channel. They are learned and are not in the file.
-        exposure: ExposureUnit = ExposureUnit::None; ExposureUnit::BOUNDS, "ours";
-        /// The pose of each camera, or of each frame of a camera that moves, is corrected by a small turn and translation.
-        poses: bool = false; Flag, "ours";
+        exposure: CorrectionUnit = CorrectionUnit::None; CorrectionUnit::BOUNDS, "ours";
+        /// What has a small turn and translation of its own. `"camera"` is for rigs that stand still. With `"frame"`, a camera
+        /// that stands still has one for all of its frames.
+        poses: CorrectionUnit = CorrectionUnit::None; CorrectionUnit::BOUNDS, "ours";
         /// The times of each camera of a rig are corrected by an offset.
         time_offsets: bool = false; Flag, "ours";
         /// How corrections are learned.
@@ -96,7 +100,7 @@ const MOST_INTERVALS: f32 = 5.0;
 #[derive(Clone, Debug)]
 pub struct Corrections {
     rates: CorrectionRates,
-    unit: ExposureUnit,
+    unit: CorrectionUnit,
     exposures: Option<Rows<6>>,
     poses: Option<Rows<6>>,
     times: Option<Rows<1>>,
@@ -149,6 +153,11 @@ fn interval_of(frames: &[Frame]) -> f32 {
     if span > 0.0 { span / (times.len() - 1) as f32 } else { 1.0 }
 }
 
+/// The number of cameras.
+fn cameras(frames: &[Frame]) -> usize {
+    frames.iter().map(|frame| frame.camera_id).collect::<BTreeSet<_>>().len()
+}
+
 /// Numbers that are equal if two poses are.
 fn bits_of_pose(frame: &Frame) -> Vec<u32> {
     let rotation = frame.camera.rotation.to_cols_array();
@@ -162,18 +171,23 @@ impl Corrections {
         let frames = &data.train;
         let camera = |frame: &Frame| frame.camera_id;
         let exposures = match config.exposure {
-            ExposureUnit::None => None,
-            ExposureUnit::Camera => Rows::by(frames.iter().map(camera)),
-            ExposureUnit::Frame => Rows::by(0..frames.len()),
+            CorrectionUnit::None => None,
+            CorrectionUnit::Camera => Rows::by(frames.iter().map(camera)),
+            CorrectionUnit::Frame => Rows::by(0..frames.len()),
         };
         // One row for a camera that stands still, one a frame for one that moves.
-        let poses = config.poses.then(|| Rows::by(frames.iter().map(|frame| (frame.camera_id, bits_of_pose(frame)))));
+        let placed = || frames.iter().map(|frame| (frame.camera_id, bits_of_pose(frame)));
+        let poses = match config.poses {
+            CorrectionUnit::None => None,
+            CorrectionUnit::Camera => Rows::by(placed()).filter(|rows| rows.len() == cameras(frames)),
+            CorrectionUnit::Frame => Rows::by(placed()),
+        };
         let times = config.time_offsets.then(|| Rows::by(frames.iter().map(camera)));
         let mut corrections = Self {
             rates: config.corrections.clone(),
             unit: config.exposure,
             exposures,
-            poses: poses.flatten(),
+            poses,
             times: times.flatten(),
             interval: interval_of(frames),
             extent: data.extent,
@@ -264,7 +278,7 @@ impl Corrections {
             }
         }
         if let Some(Rows { values, .. }) = &mut self.exposures {
-            let middle = if self.unit == ExposureUnit::Frame { means(values) } else { medians(values) };
+            let middle = if self.unit == CorrectionUnit::Frame { means(values) } else { medians(values) };
             shifted(values, middle, exposure::bounded);
         }
         if let Some(rows) = &mut self.poses {
@@ -321,7 +335,7 @@ impl Corrections {
         let mut record = CorrectionsRecord::default();
         if let Some(rows) = &self.exposures {
             let exposure = |frame| ExposureRecord {
-                frame: (self.unit == ExposureUnit::Frame).then(|| name(frame)),
+                frame: (self.unit == CorrectionUnit::Frame).then(|| name(frame)),
                 camera: camera(frame),
                 exposure: Exposure::of(rows.of(frame)),
             };

@@ -30,8 +30,8 @@ fn rig(cameras: u32, times: usize) -> Scene {
     Scene::new("memory", Path::new("rig"), frames, PointCloud::random(30, 0.8, 0), [0.0; 3]).unwrap()
 }
 
-fn all(exposure: ExposureUnit) -> CorrectionsConfig {
-    CorrectionsConfig { exposure, poses: true, time_offsets: true, ..CorrectionsConfig::default() }
+fn all(unit: CorrectionUnit) -> CorrectionsConfig {
+    CorrectionsConfig { exposure: unit, poses: unit, time_offsets: true, ..CorrectionsConfig::default() }
 }
 
 /// Gaussians that move along a curve, without harmonics above degree 0. With `size` 0 each of them covers the whole image, so
@@ -126,19 +126,24 @@ fn gradients_are_those_of_the_corrected_image() {
 #[test]
 fn a_single_camera_differs_from_nothing() {
     let one = rig(1, 5);
-    assert!(Corrections::new(&all(ExposureUnit::Camera), &one, SCHEDULE).is_off());
-    assert!(!Corrections::new(&all(ExposureUnit::Frame), &one, SCHEDULE).is_off());
+    assert!(Corrections::new(&all(CorrectionUnit::Camera), &one, SCHEDULE).is_off());
+    assert!(!Corrections::new(&all(CorrectionUnit::Frame), &one, SCHEDULE).is_off());
     assert!(Corrections::new(&CorrectionsConfig::default(), &rig(3, 5), SCHEDULE).is_off());
-    let rig = Corrections::new(&all(ExposureUnit::Camera), &rig(3, 5), SCHEDULE);
+    let rig = Corrections::new(&all(CorrectionUnit::Camera), &rig(3, 5), SCHEDULE);
     let rows = [rig.exposures.unwrap().len(), rig.poses.unwrap().len(), rig.times.unwrap().len()];
     assert_eq!(rows, [3; 3]);
+    // A camera that moves has no pose of its own to correct.
+    let mut moving = self::rig(3, 5);
+    moving.train[0].camera = camera(0.5);
+    assert!(Corrections::new(&all(CorrectionUnit::Camera), &moving, SCHEDULE).poses.is_none());
+    assert_eq!(Corrections::new(&all(CorrectionUnit::Frame), &moving, SCHEDULE).poses.unwrap().len(), 4);
 }
 
 /// All images brighter, all cameras turned about the middle, all of them late: the scene could do this as well.
 #[test]
 fn what_is_common_to_all_is_not_learned() {
     let data = rig(5, 3);
-    let mut corrections = Corrections::new(&all(ExposureUnit::Frame), &data, SCHEDULE);
+    let mut corrections = Corrections::new(&all(CorrectionUnit::Frame), &data, SCHEDULE);
     let turn = glam::Vec3::new(0.01, -0.02, 0.005);
     let middle = (0..5).map(|id| camera(id as f32).center()).sum::<glam::Vec3>() / 5.0;
     for (id, row) in corrections.poses.as_mut().unwrap().values.iter_mut().enumerate() {
@@ -163,11 +168,11 @@ fn what_is_common_to_all_is_not_learned() {
 #[test]
 fn a_checkpoint_restores_all_numbers_and_nothing_else() {
     let data = rig(3, 4);
-    let mut corrections = Corrections::new(&all(ExposureUnit::Frame), &data, SCHEDULE);
+    let mut corrections = Corrections::new(&all(CorrectionUnit::Frame), &data, SCHEDULE);
     let gradient = GradientOfView { exposure: Some([0.1; 6]), pose: Some([-0.2; 6]), time: Some(0.3) };
     corrections.learn([(0, &gradient), (5, &gradient)], 50);
     corrections.learn([(0, &gradient)], 51);
-    let mut again = Corrections::new(&all(ExposureUnit::Frame), &data, SCHEDULE);
+    let mut again = Corrections::new(&all(CorrectionUnit::Frame), &data, SCHEDULE);
     again.restore(corrections.state()).unwrap();
     assert_eq!(again.state(), corrections.state());
     assert_eq!(
@@ -179,7 +184,7 @@ fn a_checkpoint_restores_all_numbers_and_nothing_else() {
     let refused = |change: &dyn Fn(Changed)| {
         let mut state = corrections.state();
         change(&mut state);
-        Corrections::new(&all(ExposureUnit::Frame), &data, SCHEDULE).restore(state).unwrap_err()
+        Corrections::new(&all(CorrectionUnit::Frame), &data, SCHEDULE).restore(state).unwrap_err()
     };
     assert!(refused(&|state| drop(state.remove("pose.first"))).contains("`corrections.pose.first` is missing"));
     assert!(refused(&|state| state.get_mut("time.values").unwrap().push(0.0)).contains("has 4 numbers, expected 3"));

@@ -32,20 +32,25 @@ fn mean(values: impl Iterator<Item = f64>) -> Option<f64> {
     (count > 0).then(|| sum / f64::from(count))
 }
 
-/// The mean of the measured test views from one share of the iterations to another.
-fn test_views(fine: &[&MetricsRecord], from: f64, to: f64) -> Option<f64> {
+/// A figure of a record, if it was measured.
+type Figure = fn(&MetricsRecord) -> Option<f64>;
+
+/// The mean of some figure from one share of the iterations to another.
+fn within(fine: &[&MetricsRecord], from: f64, to: f64, figure: Figure) -> Option<f64> {
     let last = fine.last()?.iteration as f64;
     let within = |record: &&&MetricsRecord| (from * last..=to * last).contains(&(record.iteration as f64));
-    mean(fine.iter().filter(within).filter_map(|record| record.test_psnr))
+    mean(fine.iter().filter(within).filter_map(|record| figure(record)))
 }
 
+/// By test views, or by training views where test views were not measured on the way.
 fn still_rising(fine: &[&MetricsRecord]) -> Option<String> {
-    let (before, end) = (test_views(fine, 0.6, 0.8)?, test_views(fine, 0.9, 1.0)?);
-    let rise = end - before;
+    let figures: [(Figure, &str); 2] = [(|record| record.test_psnr, "test"), (|record| record.psnr, "training")];
+    let rise = |figure| Some(within(fine, 0.9, 1.0, figure)? - within(fine, 0.6, 0.8, figure)?);
+    let (rise, views) = figures.into_iter().find_map(|(figure, views)| Some((rise(figure)?, views)))?;
     (rise > STILL_RISING).then(|| {
         format!(
-            "the schedule is short: the last fifth of the iterations still added {rise:.1} dB on the test views; train longer, \
-             for example with --minutes"
+            "the schedule is short: the last fifth of the iterations still added {rise:.1} dB on the {views} views; train \
+             longer, for example with --minutes"
         )
     })
 }
@@ -71,8 +76,8 @@ fn not_confirmed(fine: &[&MetricsRecord], test: f64) -> Option<String> {
     (train - test > NOT_CONFIRMED).then(|| {
         format!(
             "training views have {train:.1} dB, test views {test:.1}: what was learned is not confirmed from other places or \
-             times. Poses, times or exposure of the images may be off (light4gs check shows them; --set train.poses and \
-             train.exposure correct small errors), the test views may be far from the others, or motion is seen from one side"
+             times. Poses, times or exposure of the images may be off (light4gs check shows them; --set train.poses=frame and \
+             train.exposure=frame correct small errors), the test views may be far from the others, or motion is seen from one side"
         )
     })
 }
@@ -96,6 +101,16 @@ mod tests {
         advice(&config, test, &records, Vec::new())
     }
 
+    /// Without a measurement of test views on the way.
+    fn run_on_training_views(test: f64, curve: impl Fn(f64) -> f64) -> Vec<String> {
+        let record = |k: usize| {
+            let mut record = MetricsRecord::new(Stage::Fine, 10 * k, k as f64, 500);
+            record.psnr = Some(curve(k as f64 / 100.0));
+            record
+        };
+        advice(&Config::default(), test, &(1..=100).map(record).collect::<Vec<_>>(), Vec::new())
+    }
+
     #[test]
     fn a_good_run_gets_no_advice_and_neither_does_a_bad_one_without_a_reason() {
         assert_eq!(run(35.0, 1000, |at| (45.0, 20.0 + 10.0 * at)), Vec::<String>::new());
@@ -108,6 +123,7 @@ mod tests {
         let only =
             |advice: Vec<String>, word: &str| assert!(advice.len() == 1 && advice[0].contains(word), "{advice:?}");
         only(run(26.0, 500, |at| (28.0, 20.0 + 6.0 * at)), "schedule is short");
+        only(run_on_training_views(26.0, |at| 20.0 + 8.0 * at), "added 2.0 dB on the training views");
         only(run(26.0, 1000, |_| (28.0, 26.0)), "too few Gaussians");
         only(run(22.0, 500, |_| (31.0, 22.0)), "not confirmed");
         let of_the_capture = |test| advice(&Config::default(), test, &[], vec!["blurred".into()]);

@@ -112,7 +112,7 @@ fn made_turns_are_recovered() {
     let turn = |id: u32| Quat::from_rotation_x(if id.is_multiple_of(2) { 0.7f32 } else { -0.7 }.to_radians());
     let faulty = || capture(|_| 1.0, turn);
     let (plain, _) = trained(faulty(), &[]);
-    let (corrected, learned) = trained(faulty(), &["train.poses=true"]);
+    let (corrected, learned) = trained(faulty(), &["train.poses=camera"]);
     assert!(corrected < 0.6 * plain, "a loss of {corrected}, without corrections {plain}");
     let poses = learned.unwrap().poses;
     assert_eq!(poses.len(), CAMERAS as usize);

@@ -44,7 +44,7 @@ const COMPANIONS: [(&str, &str, Overrides); 18] = [
     (
         "train.corrections.",
         "",
-        &[("train.exposure", "\"frame\""), ("train.poses", "true"), ("train.corrections.from", "0")],
+        &[("train.exposure", "\"frame\""), ("train.poses", "\"frame\""), ("train.corrections.from", "0")],
     ),
     ("train.guided_sampling.", "", &[("model.field", "\"nodes\""), ("model.nodes.lifetime", "true")]),
     ("train.guided_sampling.count", "", &[("train.guided_sampling.iterations", "[2]")]),

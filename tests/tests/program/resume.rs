@@ -27,7 +27,7 @@ fn killed_and_resumed_runs_of_control_nodes_are_bit_identical() {
 /// Exposures and poses of frames are in checkpoints, with what Adam knows of them.
 #[test]
 fn killed_and_resumed_runs_with_corrections_are_bit_identical() {
-    let corrections = ["train.exposure=frame", "train.poses=true", "train.corrections.from=3"];
+    let corrections = ["train.exposure=frame", "train.poses=frame", "train.corrections.from=3"];
     killed_and_resumed(&TINY_COMPRESSION.into_iter().chain(corrections).collect::<Vec<&str>>());
 }
 

@@ -39,7 +39,7 @@ pub use lifetime::LIFETIME;
 
 use super::{DeformationField, FinePosition, LearningRate, Moment, SceneAtRest, ScenePoints};
 use crate::ops::columns::columns;
-use crate::ops::node_poses::{NodeParameters, pose};
+use crate::ops::node_poses::{Ends, NodeParameters, pose};
 use crate::ops::node_regularizer::{Regularization, regularize};
 pub use crate::ops::skinning::MOST_AFFINITIES;
 use crate::ops::skinning::{SkinningInputs, skin};
@@ -85,6 +85,8 @@ keys! {
         /// Number of affinities: learned numbers by which a Gaussian follows some nodes more than its distance from them says.
         /// So a foot and the floor under it need not move together.
         affinities: usize = 0; Whole { least: 0, most: MOST_AFFINITIES as u64 }, "after SC-GS";
+        /// Trajectories do not bend at their ends: the first knot and the last follow from their neighbors.
+        natural_ends: bool = false; Flag, "ours";
         /// Weight of the term that keeps each node where its neighbors expect it (as rigid as possible).
         rigidity: f64 = 1.0; WEIGHT, "ours; SC-GS: 1e-4 to 0";
         /// Weight of the squared second differences of trajectories.
@@ -161,6 +163,10 @@ impl NodesField {
         self.translations.dims()[0]
     }
 
+    fn ends(&self) -> Ends {
+        if self.config.natural_ends { Ends::Natural } else { Ends::Free }
+    }
+
     fn parameters(&self) -> NodeParameters {
         NodeParameters {
             anchors: self.anchors.val(),
@@ -169,6 +175,7 @@ impl NodesField {
             rotations: self.rotations.val(),
             affinities: self.affinities.as_ref().map(|affinities| affinities.val()),
             unit: self.unit.val(),
+            ends: self.ends(),
         }
     }
 
@@ -253,7 +260,7 @@ impl DeformationField for NodesField {
 
     fn regularizer(&self, _: &SceneAtRest<'_>, position: &FinePosition) -> Option<Tensor<1>> {
         let [rigidity, smoothness] = [self.config.rigidity, self.config.smoothness].map(|weight| weight as f32);
-        let regularization = Regularization { rigidity, smoothness, time: position.random_time() };
+        let regularization = Regularization { rigidity, smoothness, time: position.random_time(), ends: self.ends() };
         (rigidity > 0.0 || smoothness > 0.0).then(|| regularize(self.parameters(), regularization))
     }
 
