@@ -1,7 +1,6 @@
 //! What poses and points say.
 
-use crate::parallax::{LEAST_PARALLAX, parallax as parallax_of};
-use crate::prepare::LEAST_REGISTERED;
+use crate::posing::{LEAST_PARALLAX, LEAST_REGISTERED, parallax as parallax_of};
 use crate::scene::Scene;
 
 /// With a smaller parallax, in degrees, depths are coarse.

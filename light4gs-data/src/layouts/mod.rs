@@ -11,7 +11,7 @@ mod nerfstudio;
 mod neu3d;
 pub(crate) mod shared;
 #[cfg(test)]
-mod written;
+pub(crate) mod written;
 
 pub use colmap::Colmap;
 pub use dnerf::DNerf;

@@ -10,7 +10,6 @@ mod summary;
 mod tests;
 mod write;
 
-pub(crate) use poses::LEAST_REGISTERED;
 pub use summary::PrepareSummary;
 
 use crate::error::DataError;

@@ -8,7 +8,7 @@ use crate::error::DataError;
 use crate::images::image_size;
 use crate::layouts::colmap::{model::Model, read_model};
 use crate::layouts::shared::files;
-use crate::parallax::LEAST_PARALLAX;
+use crate::posing::{LEAST_PARALLAX, LEAST_REGISTERED};
 use crate::programs::colmap::{Colmap, Effort, FILM_AGAIN, Job, Mapper, Motion};
 use std::fs;
 use std::io::Write;
@@ -23,8 +23,6 @@ const NEIGHBORS: usize = 8;
 const PARTS: usize = 16;
 /// Images with a longer side below this number of pixels are doubled in size before features are searched.
 const SMALL: u32 = 800;
-/// If a smaller share of the images has a pose, there is a second attempt.
-pub(crate) const LEAST_REGISTERED: f64 = 0.8;
 /// If so large a share of the pairs that moved shows nothing but a turn, and there are this many, and there is no model of a
 /// fair share of the images, the camera only turned.
 const TURNED: f64 = 0.5;

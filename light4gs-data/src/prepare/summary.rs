@@ -1,7 +1,6 @@
 //! The result, and advice if it is poor.
 
-use super::poses::LEAST_REGISTERED;
-use crate::parallax::LEAST_PARALLAX;
+use crate::posing::{LEAST_PARALLAX, LEAST_REGISTERED};
 use std::fmt;
 
 /// If the mean reprojection error, in pixels, is larger, the poses blur the trained scene.

@@ -102,10 +102,10 @@ fn middle(model: &Model) -> DVec3 {
     middle
 }
 
-/// See [`crate::parallax::parallax`].
+/// See [`crate::posing::parallax`].
 pub(super) fn parallax(model: &Model) -> f64 {
     let centers: Vec<DVec3> = model.images.iter().map(|image| image.center).collect();
-    crate::parallax::parallax(&centers, &model.points.positions)
+    crate::posing::parallax(&centers, &model.points.positions)
 }
 
 /// COLMAP's world has an arbitrary origin, orientation and size. Turns the mean upward direction of the cameras to z,

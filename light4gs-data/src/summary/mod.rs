@@ -234,4 +234,6 @@ fn points(scene: &Scene, problems: &mut Vec<String>) -> String {
 }
 
 #[cfg(test)]
+mod damaged;
+#[cfg(test)]
 mod tests;

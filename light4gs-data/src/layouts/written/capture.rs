@@ -7,24 +7,24 @@ use crate::synthetic::Studio;
 use glam::{DVec2, Vec3};
 
 /// Width and height of the images, pixels: not square, odd, and with the principal point off the middle.
-pub(super) const SIZE: (u32, u32) = (97, 74);
+pub(crate) const SIZE: (u32, u32) = (97, 74);
 
 /// One image of the capture.
-pub(super) struct Shot {
-    pub(super) name: String,
-    pub(super) pinhole: Camera,
-    pub(super) lens: Option<Lens>,
-    pub(super) time: f32,
+pub(crate) struct Shot {
+    pub(crate) name: String,
+    pub(crate) pinhole: Camera,
+    pub(crate) lens: Option<Lens>,
+    pub(crate) time: f32,
 }
 
 /// The scene and the shots.
-pub(super) struct Capture {
+pub(crate) struct Capture {
     studio: Studio,
-    pub(super) shots: Vec<Shot>,
+    pub(crate) shots: Vec<Shot>,
 }
 
 /// OpenCV's radial-tangential lens of a wide phone camera.
-pub(super) fn opencv() -> Lens {
+pub(crate) fn opencv() -> Lens {
     Lens::new(
         Distortion::RadialTangential { radial: [-0.12, 0.03, 0.0, 0.0, 0.0, 0.0], tangential: [0.002, -0.0015] },
         0.0,
@@ -33,14 +33,14 @@ pub(super) fn opencv() -> Lens {
 }
 
 /// A fisheye of an action camera.
-pub(super) fn fisheye() -> Lens {
+pub(crate) fn fisheye() -> Lens {
     Lens::new(Distortion::Fisheye { radial: [-0.02, 0.004, 0.0, 0.0] }, 0.0).unwrap()
 }
 
 impl Capture {
     /// Cameras on an arc that look at the middle. `plan` gives for each shot its name, the camera's place on the arc (0
     /// to 1), time and lens.
-    pub(super) fn new(centered: bool, plan: Vec<(String, f32, f32, Option<Lens>)>) -> Self {
+    pub(crate) fn new(centered: bool, plan: Vec<(String, f32, f32, Option<Lens>)>) -> Self {
         let shots = plan
             .into_iter()
             .map(|(name, on_arc, time, lens)| {
@@ -58,13 +58,13 @@ impl Capture {
     }
 
     /// A moving camera: `count` frames called `PREFIX0000`...
-    pub(super) fn moving(prefix: &str, count: usize, lens: Option<Lens>) -> Self {
+    pub(crate) fn moving(prefix: &str, count: usize, lens: Option<Lens>) -> Self {
         let share = |i: usize| i as f32 / (count - 1) as f32;
         Self::new(false, (0..count).map(|i| (format!("{prefix}{i:04}"), share(i), share(i), lens)).collect())
     }
 
     /// The image as recorded through the shot's lens.
-    pub(super) fn recorded(&self, i: usize) -> RgbImage8 {
+    pub(crate) fn recorded(&self, i: usize) -> RgbImage8 {
         let shot = &self.shots[i];
         let camera = &shot.pinhole;
         let axes = camera.rotation.transpose();
@@ -82,7 +82,7 @@ impl Capture {
     }
 
     /// The image that a pinhole would have recorded, at a size.
-    pub(super) fn pinhole_image(&self, i: usize, size: (u32, u32)) -> RgbImage8 {
+    pub(crate) fn pinhole_image(&self, i: usize, size: (u32, u32)) -> RgbImage8 {
         let shot = &self.shots[i];
         let camera = shot.pinhole.resized(size.0, size.1);
         let axes = camera.rotation.transpose();

@@ -31,7 +31,7 @@ fn pose(shot: &Shot) -> [f64; 7] {
     [q.w, q.x, q.y, q.z, t.x, t.y, t.z].map(f64::from)
 }
 
-pub(super) fn write_images(root: &Path, capture: &Capture) {
+pub(crate) fn write_images(root: &Path, capture: &Capture) {
     for (i, shot) in capture.shots.iter().enumerate() {
         let path = root.join(format!("images/{}.png", shot.name));
         fs::create_dir_all(path.parent().unwrap()).unwrap();
@@ -40,7 +40,7 @@ pub(super) fn write_images(root: &Path, capture: &Capture) {
     fs::create_dir_all(root.join("sparse/0")).unwrap();
 }
 
-pub(super) fn write_text(root: &Path, capture: &Capture) {
+pub(crate) fn write_text(root: &Path, capture: &Capture) {
     let (mut cameras, mut images) = ("# cameras\n".to_owned(), "# images\n".to_owned());
     for (i, shot) in capture.shots.iter().enumerate() {
         let (_, model, values) = parameters(shot);
@@ -58,7 +58,7 @@ pub(super) fn write_text(root: &Path, capture: &Capture) {
         .unwrap();
 }
 
-pub(super) fn write_binary(root: &Path, capture: &Capture) {
+pub(crate) fn write_binary(root: &Path, capture: &Capture) {
     let count = (capture.shots.len() as u64).to_le_bytes();
     let (mut cameras, mut images) = (count.to_vec(), count.to_vec());
     let floats = |values: &[f64]| -> Vec<u8> { values.iter().flat_map(|v| v.to_le_bytes()).collect() };

@@ -7,7 +7,7 @@ use serde_json::{Value, json};
 use std::fs;
 
 /// Writes the shots: even ones to train on, odd ones to test, with intrinsics at the top of the files or in every frame.
-pub(super) fn write(root: &Path, capture: &Capture, shared: bool) {
+pub(crate) fn write(root: &Path, capture: &Capture, shared: bool) {
     write_images(root, capture);
     for (split, first) in [("train", 0), ("test", 1)] {
         let mut top = if shared { intrinsics(&capture.shots[0]) } else { json!({}) };

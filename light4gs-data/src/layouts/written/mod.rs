@@ -1,13 +1,12 @@
 //! One synthetic scene, photographed through known lenses, written in every layout and read back. Points project to the
 //! right places, undistorted images are those of a pinhole, times and splits are those of the layout.
 
-mod capture;
-mod colmap;
-mod damaged;
-mod dnerf;
-mod nerfies;
-mod nerfstudio;
-mod neu3d;
+pub(crate) mod capture;
+pub(crate) mod colmap;
+pub(crate) mod dnerf;
+pub(crate) mod nerfies;
+pub(crate) mod nerfstudio;
+pub(crate) mod neu3d;
 
 use crate::images::ImageStore;
 use crate::options::LoadOptions;
@@ -22,7 +21,7 @@ const MOST_PIXELS: f32 = 0.5;
 /// 30.
 const LEAST_PSNR: f64 = 33.0;
 
-fn options() -> LoadOptions {
+pub(crate) fn options() -> LoadOptions {
     LoadOptions { background: [0.0; 3], ..Default::default() }
 }
 

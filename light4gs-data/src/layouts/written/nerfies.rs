@@ -31,7 +31,7 @@ fn camera(shot: &Shot) -> Value {
     })
 }
 
-pub(super) fn write(root: &Path, capture: &Capture, val: &[usize]) {
+pub(crate) fn write(root: &Path, capture: &Capture, val: &[usize]) {
     for folder in ["camera", "rgb/2x"] {
         fs::create_dir_all(root.join(folder)).unwrap();
     }

@@ -6,7 +6,7 @@ use crate::lens::Distortion;
 use serde_json::{Value, json};
 use std::fs;
 
-pub(super) fn intrinsics(shot: &Shot) -> Value {
+pub(crate) fn intrinsics(shot: &Shot) -> Value {
     let c = shot.pinhole;
     let mut value = json!({"fl_x": c.fx, "fl_y": c.fy, "cx": c.cx, "cy": c.cy, "w": SIZE.0, "h": SIZE.1});
     match shot.lens.map(|lens| lens.distortion) {
@@ -27,7 +27,7 @@ pub(super) fn intrinsics(shot: &Shot) -> Value {
 }
 
 /// The document with intrinsics at the top, or in every frame.
-pub(super) fn document(capture: &Capture, shared: bool) -> Value {
+pub(crate) fn document(capture: &Capture, shared: bool) -> Value {
     let mut top = if shared { intrinsics(&capture.shots[0]) } else { json!({}) };
     let frames: Vec<Value> = capture
         .shots
@@ -44,7 +44,7 @@ pub(super) fn document(capture: &Capture, shared: bool) -> Value {
 }
 
 /// Writes the images that are not there yet.
-pub(super) fn write_images(root: &Path, capture: &Capture) {
+pub(crate) fn write_images(root: &Path, capture: &Capture) {
     fs::create_dir_all(root.join("images")).unwrap();
     for (i, shot) in capture.shots.iter().enumerate() {
         let path = root.join(format!("images/{}.png", shot.name));
@@ -54,7 +54,7 @@ pub(super) fn write_images(root: &Path, capture: &Capture) {
     }
 }
 
-pub(super) fn write(root: &Path, capture: &Capture, document: &Value) {
+pub(crate) fn write(root: &Path, capture: &Capture, document: &Value) {
     write_images(root, capture);
     fs::write(root.join("transforms.json"), document.to_string()).unwrap();
 }

@@ -5,7 +5,7 @@ use super::*;
 use std::fs;
 
 /// An array of float64 as `.npy`.
-pub(super) fn npy(rows: usize, columns: usize, values: &[f64]) -> Vec<u8> {
+pub(crate) fn npy(rows: usize, columns: usize, values: &[f64]) -> Vec<u8> {
     let header = format!("{{'descr': '<f8', 'fortran_order': False, 'shape': ({rows}, {columns}), }}\n");
     let mut out = b"\x93NUMPY\x01\x00".to_vec();
     out.extend((header.len() as u16).to_le_bytes());
@@ -27,14 +27,14 @@ fn row(shot: &Shot) -> Vec<f64> {
     row
 }
 
-pub(super) fn rig(cameras: usize, instants: usize) -> Capture {
+pub(crate) fn rig(cameras: usize, instants: usize) -> Capture {
     let plan = (0..cameras).flat_map(|c| {
         (0..instants).map(move |i| (format!("cam{c:02}_{i:04}"), c as f32 / 3.0, i as f32 / instants as f32, None))
     });
     Capture::new(true, plan.collect())
 }
 
-pub(super) fn write(root: &Path, capture: &Capture, instants: usize) {
+pub(crate) fn write(root: &Path, capture: &Capture, instants: usize) {
     let mut table = Vec::new();
     for (i, shot) in capture.shots.iter().enumerate() {
         let (camera, instant) = (i / instants, i % instants);

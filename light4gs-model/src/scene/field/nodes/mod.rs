@@ -71,6 +71,8 @@ keys! {
         count: usize = 32; Whole { least: 1, most: MOST_NODES as u64 }, "ours; SC-GS: 512";
         /// Training times between two knots of a trajectory.
         times_a_knot: f64 = 4.0; Number { least: 0.1, most: 1e6 }, "ours";
+        /// Trajectories do not bend at their ends: the first knot and the last follow from their neighbors.
+        natural_ends: bool = false; Flag, "ours";
         /// A node's radius at the beginning, as a share of the distance to the nearest other one.
         radius: f64 = 0.6; Number { least: 0.01, most: 100.0 }, "ours";
         /// Nodes are placed at Gaussians with at least this opacity.
@@ -85,8 +87,6 @@ keys! {
         /// Number of affinities: learned numbers by which a Gaussian follows some nodes more than its distance from them says.
         /// So a foot and the floor under it need not move together.
         affinities: usize = 0; Whole { least: 0, most: MOST_AFFINITIES as u64 }, "after SC-GS";
-        /// Trajectories do not bend at their ends: the first knot and the last follow from their neighbors.
-        natural_ends: bool = false; Flag, "ours";
         /// Weight of the term that keeps each node where its neighbors expect it (as rigid as possible).
         rigidity: f64 = 1.0; WEIGHT, "ours; SC-GS: 1e-4 to 0";
         /// Weight of the squared second differences of trajectories.

@@ -1,8 +1,9 @@
 //! Captures of every layout with damaged files: opened and looked at, or refused, without a panic.
 
-use super::capture::{Capture, opencv};
-use super::options;
-use crate::{CaptureSummary, ImageStore, Scene, camera_curves};
+use super::CaptureSummary;
+use crate::layouts::written::capture::{Capture, opencv};
+use crate::layouts::written::{colmap, dnerf, nerfies, nerfstudio, neu3d, options};
+use crate::{ImageStore, Scene, camera_curves};
 use rand::seq::IndexedRandom;
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
@@ -107,22 +108,20 @@ fn survives(layout: &str, write: impl FnOnce(&Path)) {
 #[test]
 fn of_nerfstudio() {
     let capture = Capture::moving("frame_", 4, Some(opencv()));
-    survives("nerfstudio", |root| {
-        super::nerfstudio::write(root, &capture, &super::nerfstudio::document(&capture, false))
-    });
+    survives("nerfstudio", |root| nerfstudio::write(root, &capture, &nerfstudio::document(&capture, false)));
 }
 
 #[test]
 fn of_dnerf() {
-    survives("dnerf", |root| super::dnerf::write(root, &Capture::moving("r_", 4, Some(opencv())), false));
+    survives("dnerf", |root| dnerf::write(root, &Capture::moving("r_", 4, Some(opencv())), false));
 }
 
 #[test]
 fn of_colmap() {
     let capture = Capture::moving("frame_", 4, Some(opencv()));
-    for write in [super::colmap::write_text, super::colmap::write_binary] {
+    for write in [colmap::write_text, colmap::write_binary] {
         survives("colmap", |root| {
-            super::colmap::write_images(root, &capture);
+            colmap::write_images(root, &capture);
             write(root, &capture);
         });
     }
@@ -130,10 +129,10 @@ fn of_colmap() {
 
 #[test]
 fn of_hypernerf() {
-    survives("hypernerf", |root| super::nerfies::write(root, &Capture::moving("", 5, None), &[]));
+    survives("hypernerf", |root| nerfies::write(root, &Capture::moving("", 5, None), &[]));
 }
 
 #[test]
 fn of_neu3d() {
-    survives("neu3d", |root| super::neu3d::write(root, &super::neu3d::rig(2, 3), 3));
+    survives("neu3d", |root| neu3d::write(root, &neu3d::rig(2, 3), 3));
 }

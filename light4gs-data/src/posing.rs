@@ -1,7 +1,9 @@
-//! Parallax: the angle at which the scene sees its cameras apart.
+//! Whether poses are good enough: thresholds, and the parallax, the angle at which the scene sees its cameras apart.
 
 use glam::DVec3;
 
+/// With a smaller share of the images, poses break off, and those at the edges are poor, too.
+pub(crate) const LEAST_REGISTERED: f64 = 0.8;
 /// With a smaller parallax, in degrees, there is no depth.
 pub(crate) const LEAST_PARALLAX: f64 = 1.5;
 
