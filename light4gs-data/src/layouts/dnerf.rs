@@ -52,6 +52,7 @@ impl DatasetLayout for DNerf {
         let val = if file("val").is_file() { Some(Split::read(root, file("val"), &mut notes)?) } else { None };
         let times: Vec<f64> = train.frames.iter().chain(&test.frames).map(|frame| frame.time).collect();
         let range = TimeRange::of(&train.file.path, "frames[].time", &times)?;
+        [Some(&test), val.as_ref()].into_iter().flatten().try_for_each(|split| split.check_unit(&train))?;
         let mut frames = |split: &Split| split.frames(range, options, &mut notes);
         let (train, test) = (frames(&train)?, frames(&test)?);
         let val = val.map_or(Ok(Vec::new()), |val| frames(&val))?;
@@ -83,6 +84,10 @@ fn points(root: &Path, options: &LoadOptions) -> Result<PointCloud, DataError> {
     }
 }
 
+/// Splits with so many different times can be compared, and those that last longer by this factor have another unit.
+const LEAST_TIMES: usize = 3;
+const UNITS: f64 = 300.0;
+
 /// One entry of `frames`.
 struct RawFrame {
     /// Its place in `frames`.
@@ -99,6 +104,31 @@ struct Split {
 }
 
 impl Split {
+    /// The different times, rising.
+    fn times(&self) -> Vec<f64> {
+        let mut times: Vec<f64> = self.frames.iter().map(|frame| frame.time).collect();
+        times.sort_by(f64::total_cmp);
+        times.dedup();
+        times
+    }
+
+    /// Refuses times that last so much longer or shorter than those of another split that they are in another unit.
+    fn check_unit(&self, other: &Self) -> Result<(), DataError> {
+        let [own, others] = [self, other].map(Self::times);
+        let span = |times: &[f64]| times[times.len() - 1] - times[0];
+        if own.len() < LEAST_TIMES || others.len() < LEAST_TIMES {
+            return Ok(());
+        }
+        let factor = span(&own) / span(&others);
+        if (1.0 / UNITS..UNITS).contains(&factor) {
+            return Ok(());
+        }
+        let [from, to, first, last] = [own[0], own[own.len() - 1], others[0], others[others.len() - 1]];
+        let problem =
+            format!("times run from {from} to {to}, those of {} from {first} to {last}", other.file.path.display());
+        Err(DataError::field(&self.file.path, "frames[].time", problem, "give the times of all splits in one unit"))
+    }
+
     fn read(root: &Path, path: PathBuf, notes: &mut Vec<String>) -> Result<Self, DataError> {
         let file = Transforms::read(root, path)?;
         let mut frames = Vec::with_capacity(file.frames.len());

@@ -140,6 +140,27 @@ fn a_time_far_from_all_others_is_refused() {
 }
 
 #[test]
+fn splits_in_different_units_are_refused() {
+    let folder = scene();
+    let mut value = transforms("train", 5);
+    for (i, frame) in value["frames"].as_array_mut().unwrap().iter_mut().enumerate() {
+        frame["time"] = json!(1000.0 * i as f64);
+    }
+    write(folder.path(), "train", &value);
+    // Two times can be close by chance.
+    assert!(Scene::open(folder.path(), &LoadOptions::default()).is_ok());
+    let mut value = transforms("test", 2);
+    let frames = value["frames"].as_array_mut().unwrap();
+    frames.push(frames[0].clone());
+    for (i, frame) in frames.iter_mut().enumerate() {
+        frame["time"] = json!(0.5 * i as f64);
+    }
+    write(folder.path(), "test", &value);
+    let words = ["transforms_test.json", "frames[].time", "from 0 to 1, those of", "from 0 to 4000", "in one unit"];
+    expect(folder.path(), &words);
+}
+
+#[test]
 fn frames_that_are_listed_twice_count_once() {
     let folder = scene();
     let mut value = transforms("train", 5);

@@ -13,6 +13,8 @@ const HELD_OUT_EVERY: usize = 8;
 const LEAST_CAMERAS: usize = 4;
 /// If the numbers have larger gaps than this factor, they are no frame numbers.
 const SPARSEST: f64 = 20.0;
+/// Words before the number of a camera, lower case.
+const CAMERA_WORDS: [&str; 3] = ["cam", "camera", "view"];
 /// Times of day that follow each other in a capture are closer than this, seconds.
 const LONGEST_PAUSE: f64 = 600.0;
 
@@ -56,7 +58,7 @@ impl PartialOrd for Instant {
 /// Cameras and times of images, from their paths relative to the folder of images.
 ///
 /// A date with a time of day gives the time; otherwise the last number of a name counts the times. The text beside it,
-/// with the folder, names the camera: `cam03/0017.png` and `cam03_0017.png` are both time 17 of camera `cam03`, and
+/// with the folder, names the camera: `cam03/0017.png`, `cam03_0017.png` and `0017_cam03.png` are all time 17 of camera 3, and
 /// `frame_0017.png` alone is a moving camera. Where an image was left out, the numbers leave a gap in time, as they
 /// should. Names without such numbers are taken in natural order, one time each.
 pub(in crate::layouts) fn sequence(names: &[String], options: &LoadOptions) -> Sequence {
@@ -185,13 +187,26 @@ fn camera_and_moment(name: &str) -> Option<Key> {
     Some((format!("{}/{}|{}", folder_of(name), &stem[..start], &stem[end..]), Instant(moment.seconds)))
 }
 
-/// The folder and the stem without its last number, and that number.
+/// Where the last number of a text stands.
+fn last_number(text: &str) -> Option<(usize, usize)> {
+    let end = text.rfind(|c: char| c.is_ascii_digit())? + 1;
+    let start = text[..end].rfind(|c: char| !c.is_ascii_digit());
+    Some((start.map_or(0, |i| i + text[i..].chars().next().map_or(1, char::len_utf8)), end))
+}
+
+/// Whether a text ends in a word for a camera, as `0017_cam` before the number of the camera.
+fn ends_in_camera(text: &str) -> bool {
+    let word = text.trim_end_matches(['_', '-', '.', ' ']).to_ascii_lowercase();
+    CAMERA_WORDS.iter().any(|camera| word.ends_with(camera))
+}
+
+/// The folder and the stem without the number that counts times, and that number: the last one, or the one before where the
+/// last one is that of a camera.
 fn camera_and_number(name: &str) -> Option<Key> {
     let stem = stem_of(Path::new(name));
-    let end = stem.rfind(|c: char| c.is_ascii_digit())? + 1;
-    let start = stem[..end]
-        .rfind(|c: char| !c.is_ascii_digit())
-        .map_or(0, |i| i + stem[i..].chars().next().map_or(1, char::len_utf8));
+    let (start, end) = last_number(&stem)?;
+    let before = last_number(&stem[..start]).filter(|_| ends_in_camera(&stem[..start]));
+    let (start, end) = before.unwrap_or((start, end));
     let number: u64 = stem[start..end].parse().ok().filter(|number| *number < 1 << 53)?;
     Some((format!("{}/{}|{}", folder_of(name), &stem[..start], &stem[end..]), Instant(number as f64)))
 }
@@ -256,6 +271,18 @@ mod tests {
         assert_eq!(read(CamerasFrom::One, TimesFrom::Number)[2], (0, 30.0 / 35.0));
         let said = sequence(&names, &options(CamerasFrom::Folder, TimesFrom::Order)).reading;
         assert!(said.cameras.starts_with("2,") && said.times.contains("order"), "{said:?}");
+    }
+
+    #[test]
+    fn a_number_behind_a_word_for_a_camera_counts_cameras() {
+        let expected = [(0, 0.0), (1, 0.0), (0, 0.5), (1, 0.5), (0, 1.0), (1, 1.0)];
+        for word in ["cam", "Camera_", "view-"] {
+            let names = [1, 2, 3].map(|time| [0, 1].map(|camera| format!("frame_{time:04}_{word}{camera}.png")));
+            assert_eq!(with(&LoadOptions::default(), &names.concat()), expected, "{word}");
+        }
+        // Alone, it counts times.
+        assert_eq!(read(&["cam1.png", "cam2.png", "cam3.png"]), [(0, 0.0), (0, 0.5), (0, 1.0)]);
+        assert_eq!(read(&["view_01.png", "view_02.png"]), [(0, 0.0), (0, 1.0)]);
     }
 
     #[test]
