@@ -1,4 +1,4 @@
-//! What the images of each camera are like over time: how bright and how sharp, and how much they change.
+//! What the images of each camera are like over time: how sharp they are, how much they change, and by what gain.
 
 use crate::error::DataError;
 use crate::frame::Frame;
@@ -35,7 +35,7 @@ pub struct CameraCurve {
     pub changes: Vec<f32>,
     /// `[K - 1]`: the logarithm of the gain that explains most of this difference; 0 if none does.
     pub log_gains: Vec<f32>,
-    /// The mean change between images that are half of all apart.
+    /// Mean absolute difference of gray values between images that are half of all apart, in `[0, 1]`.
     pub far_change: f32,
     /// Every n-th image of the camera is looked at.
     pub every: usize,
@@ -113,6 +113,7 @@ fn gray(image: &RgbImage8) -> Vec<f32> {
     image.pixels.chunks_exact(3).map(|rgb| rgb.iter().map(|value| f32::from(*value)).sum::<f32>() / 765.0).collect()
 }
 
+/// Mean absolute difference of gray values.
 fn change(a: &[f32], b: &[f32]) -> f32 {
     let sum: f32 = a.iter().zip(b).map(|(a, b)| (a - b).abs()).sum();
     sum / a.len().min(b.len()).max(1) as f32

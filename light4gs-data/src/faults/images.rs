@@ -12,7 +12,7 @@ const AROUND: usize = 4;
 const RUNS_ON: f32 = 0.7;
 /// If a larger share of the images is blurred, it is worth a word.
 const BLURRED_SHARE: f64 = 0.05;
-/// With less sharpness than this, all detail is in an image of half the size.
+/// With less sharpness than this, all detail is in an image of half the size: a blur of two pixels and more.
 const LEAST_SHARPNESS: f32 = 0.085;
 /// A larger change of a gain's logarithm from one image to the next is a jump.
 const JUMP: f32 = 0.04;
@@ -23,7 +23,7 @@ const NOISE: f32 = 0.003;
 /// The fewest images from which motion is judged.
 const LEAST_IMAGES: usize = 8;
 
-/// Images that are smaller inside than outside.
+/// Images whose whole detail is in a smaller image.
 pub(super) fn soft(scene: &Scene, curves: &[CameraCurve]) -> Option<String> {
     let usual = median(curves.iter().flat_map(|curve| curve.sharpness.iter().copied()))?;
     let camera = &scene.train.first()?.camera;

@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use clap::Args;
 use clap::builder::PossibleValuesParser;
 use light4gs_data::{
-    CameraCurve, CaptureSummary, DataError, Layouts, RgbImage8, Scene, camera_curves, write_atomically,
+    CameraCurve, CaptureSummary, DataError, ImageStore, Layouts, RgbImage8, Scene, camera_curves, write_atomically,
 };
 use light4gs_report::capture_page;
 use light4gs_train::config::Config;
@@ -65,9 +65,10 @@ impl Check {
         overrides.push(format!("data.layout={}", layout.name()));
         let config = Config::load(Config::preset_of(layout)?, &overrides)?;
         let scene = Scene::open(&self.scene, &load_options(&config))?;
-        let (capture, curves) = understand(&config, &scene)?;
+        let store = image_store(&config);
+        let (capture, curves) = understand(&store, &scene)?;
         if let Some(page) = &self.html {
-            let html = capture_page(&scene, &capture, &curves, &contact_sheet(&config, &scene)?)?;
+            let html = capture_page(&scene, &capture, &curves, &contact_sheet(&store, &scene)?)?;
             write_atomically(page, |out| std::io::Write::write_all(out, html.as_bytes()))?;
         }
         if self.json {
@@ -84,8 +85,8 @@ impl Check {
 }
 
 /// What a dataset is taken for, with its faults, and the curves that show them. Images are decoded for it.
-pub(super) fn understand(config: &Config, scene: &Scene) -> Result<(CaptureSummary, Vec<CameraCurve>), TrainError> {
-    let curves = camera_curves(scene, &image_store(config), CURVE_IMAGES)?;
+pub(super) fn understand(store: &ImageStore, scene: &Scene) -> Result<(CaptureSummary, Vec<CameraCurve>), DataError> {
+    let curves = camera_curves(scene, store, CURVE_IMAGES)?;
     Ok((CaptureSummary::of(scene)?.with_faults(scene, &curves), curves))
 }
 
@@ -122,8 +123,7 @@ fn table(capture: &CaptureSummary) -> Table {
 }
 
 /// Small images, evenly chosen, in order of time.
-fn contact_sheet(config: &Config, scene: &Scene) -> Result<Vec<(String, RgbImage8)>, DataError> {
-    let store = image_store(config);
+fn contact_sheet(store: &ImageStore, scene: &Scene) -> Result<Vec<(String, RgbImage8)>, DataError> {
     let mut frames: Vec<_> = scene.train.iter().chain(&scene.test).filter(|frame| frame.has_image()).collect();
     frames.sort_by(|a, b| a.time.total_cmp(&b.time).then(a.camera_id.cmp(&b.camera_id)));
     let chosen = frames.iter().step_by(frames.len().div_ceil(SHEET_IMAGES).max(1));

@@ -106,7 +106,7 @@ pub(super) fn train(
     // From here on requests to stop are noticed.
     stop_flag();
     let data = check_inputs(&config, scene)?;
-    let (capture, _) = understand(&config, &data)?;
+    let (capture, _) = understand(&image_store(&config), &data)?;
     tell_capture(&capture);
     refuse_problems(scene, &capture)?;
     // If the encoder would refuse the scene, for example for a point at 3e38, the run that --overwrite replaces must

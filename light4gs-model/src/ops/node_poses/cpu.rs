@@ -47,14 +47,14 @@ impl NodeSlices<'_> {
         (-2.0 * self.log_radii[node]).exp() / (2.0 * self.unit * self.unit)
     }
 
-    fn spline(&self, posing: &Posing) -> Spline {
-        Spline::at(posing.time, self.knots.count(), posing.ends)
+    fn spline(&self, time: f32) -> Spline {
+        Spline::at(time, self.knots.count())
     }
 }
 
 /// Posed nodes `[B, 20 + H]`.
-fn pose_slices(nodes: &NodeSlices, posing: &Posing) -> Vec<f32> {
-    let spline = nodes.spline(posing);
+fn pose_slices(nodes: &NodeSlices, time: f32) -> Vec<f32> {
+    let spline = nodes.spline(time);
     let width = nodes.affinity_count();
     let mut posed = Vec::with_capacity(nodes.knots.nodes * (POSED + width));
     for node in 0..nodes.knots.nodes {
@@ -72,8 +72,8 @@ fn pose_slices(nodes: &NodeSlices, posing: &Posing) -> Vec<f32> {
 }
 
 /// Gradients of all parameters but the unit, from `upstream [B, 20 + H]`.
-fn pose_backward(nodes: &NodeSlices, posing: &Posing, upstream: &[f32]) -> NodeGradients {
-    let spline = nodes.spline(posing);
+fn pose_backward(nodes: &NodeSlices, time: f32, upstream: &[f32]) -> NodeGradients {
+    let spline = nodes.spline(time);
     let count = nodes.knots.nodes;
     let columns = POSED + nodes.affinity_count();
     let mut gradients = NodeGradients {
@@ -124,7 +124,7 @@ impl CpuSaved {
 fn forward_on_cpu<B: HostBackend>(nodes: NodeTensors<B>, posing: Posing) -> (FloatTensor<B>, CpuSaved) {
     let count = nodes.anchors.shape()[0];
     let saved = CpuSaved { inputs: nodes.into_array().map(B::to_host), nodes: count, posing };
-    let posed = pose_slices(&saved.slices(), &posing);
+    let posed = pose_slices(&saved.slices(), posing.time);
     (B::from_values(posed, [count, POSED + posing.affinities]), saved)
 }
 
@@ -132,7 +132,7 @@ fn backward_on_cpu<B: HostBackend>(saved: CpuSaved, gradient: FloatTensor<B>) ->
     let upstream = B::to_host(gradient);
     let slices = saved.slices();
     let (nodes, knots) = (saved.nodes, slices.knots.count());
-    let gradients = pose_backward(&slices, &saved.posing, upstream.as_slice());
+    let gradients = pose_backward(&slices, saved.posing.time, upstream.as_slice());
     [
         B::from_values(gradients.anchors, [nodes, 3]),
         B::from_values(gradients.log_radii, [nodes, 1]),

@@ -10,7 +10,7 @@ use cubecl::server::Handle;
 use light4gs_shaders::{NODE_POSES, NODE_POSES_BACKWARD, Shader};
 
 use super::spline::Spline;
-use super::{Ends, INPUTS, LEARNED, NodeParameters, NodePoseKernels, NodeTensors, Posing, pose};
+use super::{INPUTS, LEARNED, NodeParameters, NodePoseKernels, NodeTensors, Posing, pose};
 use crate::gpu::{Gpu, Kernel, Launch, Places, buffer_of, first_words};
 use crate::gpu_error::GpuError;
 use crate::ops::fusion::{leaf, resolve};
@@ -58,7 +58,7 @@ pub struct PosedNodes {
 
 impl PosedNodes {
     fn spline(&self) -> Vec<u32> {
-        words_of(&Spline::at(self.posing.time, self.knots, self.posing.ends), self.nodes, self.knots)
+        words_of(&Spline::at(self.posing.time, self.knots), self.nodes, self.knots)
     }
 
     /// Columns of a posed node.
@@ -149,7 +149,6 @@ impl NodeParameters {
             rotations: numbers.leaf(knots, 4 * nodes, -0.7, 0.7),
             affinities: (affinities > 0).then(|| numbers.leaf(nodes, affinities, -0.7, 0.7)),
             unit: numbers.matrix(1, 1, 2.5, 2.5).reshape([1]),
-            ends: Ends::Free,
         }
     }
 }

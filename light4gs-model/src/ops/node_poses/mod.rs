@@ -13,8 +13,6 @@ use burn::backend::tensor::FloatTensor;
 use burn::backend::{Autodiff, Backend, Dispatch, ExtensionType, backend_extension};
 use burn::tensor::Tensor;
 
-pub use spline::Ends;
-
 use super::{for_all_back_ends, recorded};
 
 /// The parameters of the nodes. Lengths are shares of the unit.
@@ -53,8 +51,6 @@ impl<B: Backend> NodeTensors<B> {
 pub struct Posing {
     /// In [0, 1].
     pub time: f32,
-    /// Ends of the trajectories.
-    pub ends: Ends,
     /// A node's affinities, 0 to [`MOST_AFFINITIES`](super::skinning::MOST_AFFINITIES).
     pub affinities: usize,
 }
@@ -113,8 +109,6 @@ pub struct NodeParameters {
     pub affinities: Option<Tensor<2>>,
     /// `[1]`, a constant, which gets no gradient: world units.
     pub unit: Tensor<1>,
-    /// Ends of the trajectories.
-    pub ends: Ends,
 }
 
 impl NodeParameters {
@@ -144,7 +138,7 @@ impl NodeParameters {
 ///
 /// ```
 /// use burn::tensor::{Device, Tensor};
-/// use light4gs_model::ops::node_poses::{Ends, NodeParameters, pose};
+/// use light4gs_model::ops::node_poses::{NodeParameters, pose};
 ///
 /// let device = Device::flex();
 /// // One node in a scene of two meters, which goes its whole way along z and does not turn.
@@ -155,7 +149,6 @@ impl NodeParameters {
 ///     rotations: Tensor::zeros([4, 4], &device),
 ///     affinities: None,
 ///     unit: Tensor::from_floats([2.0], &device),
-///     ends: Ends::Free,
 /// };
 /// let posed = pose(nodes, 1.0).into_data().to_vec::<f32>().unwrap();
 /// assert_eq!(posed[..4], [1.0, 0.0, 0.0, 0.125]);
@@ -166,8 +159,8 @@ impl NodeParameters {
 /// If the shapes do not belong together, or there is no node; the message names the tensor.
 pub fn pose(nodes: NodeParameters, time: f32) -> Tensor<2> {
     nodes.check();
-    let NodeParameters { anchors, log_radii, translations, rotations, affinities, unit, ends } = nodes;
-    let posing = Posing { time, ends, affinities: affinities.as_ref().map_or(0, |affinities| affinities.dims()[1]) };
+    let NodeParameters { anchors, log_radii, translations, rotations, affinities, unit } = nodes;
+    let posing = Posing { time, affinities: affinities.as_ref().map_or(0, |affinities| affinities.dims()[1]) };
     let affinities = affinities.unwrap_or_else(|| log_radii.clone().detach());
     Tensor::from_dispatch(Dispatch::node_poses(
         NodeTensors {

@@ -98,8 +98,8 @@ fn bend(knots: &[f32], columns: usize, scale: f32, gradients: &mut [f32]) -> f32
 
 /// See [`regularize`](super::regularize). Anchors are `[B, 3]`, logarithms of radii `[B, 1]`.
 fn regularize_slices(anchors: &[f32], log_radii: &[f32], knots: Knots, regularization: &Regularization) -> Regularized {
-    let Regularization { rigidity, smoothness, time, ends } = *regularization;
-    let spline = Spline::at(time, knots.count(), ends);
+    let Regularization { rigidity, smoothness, time } = *regularization;
+    let spline = Spline::at(time, knots.count());
     let node = |node: usize| {
         let anchor = Vec3::from_slice(&anchors[3 * node..]);
         let motion = knots.motion(node, &spline);

@@ -13,9 +13,9 @@ use super::{LEARNED, NodeRegularizerKernels, ROTATIONS, Regularization, Regulari
 use crate::gpu::{Gpu, Kernel, Launch, Places, buffer_of, first_words};
 use crate::gpu_error::GpuError;
 use crate::ops::fusion::{leaf, resolve};
+use crate::ops::node_poses::NodeParameters;
 use crate::ops::node_poses::gpu::{starts, words_of};
 use crate::ops::node_poses::spline::Spline;
-use crate::ops::node_poses::{Ends, NodeParameters};
 use crate::ops::sample::{GpuOperation, Numbers};
 
 /// The operation for checks.
@@ -49,10 +49,10 @@ fn forward(
     regularization: Regularization,
 ) -> Result<(CubeTensor, RegularizedNodes), GpuError> {
     let gpu = Gpu::of(&nodes.anchors)?;
-    let Regularization { rigidity, smoothness, time, ends } = regularization;
+    let Regularization { rigidity, smoothness, time } = regularization;
     let (count, knots) = (nodes.anchors.shape()[0], nodes.translations.shape()[0]);
     let [anchors, translations, rotations, log_radii] = nodes.into_array().map(buffer_of);
-    let spline = words_of(&Spline::at(time, knots, ends), count, knots);
+    let spline = words_of(&Spline::at(time, knots), count, knots);
     let sums = gpu.allocate("sums over neighbors", SUMS * count)?;
     Launch::new(&gpu.client, NODE_STRAIN)
         .reads(&anchors)
@@ -132,6 +132,6 @@ fn sample(device: &Device) -> Vec<TensorData> {
     let mut numbers = Numbers::new(&device.clone().autodiff());
     let nodes = NodeParameters::sample(&mut numbers, 0);
     let leaves = [&nodes.anchors, &nodes.translations, &nodes.rotations].map(Clone::clone);
-    let loss = regularize(nodes, Regularization { rigidity: 0.75, smoothness: 0.5, time: 0.6, ends: Ends::Free });
+    let loss = regularize(nodes, Regularization { rigidity: 0.75, smoothness: 0.5, time: 0.6 });
     numbers.with_gradients(loss, &leaves)
 }

@@ -11,7 +11,7 @@ use burn::backend::tensor::FloatTensor;
 use burn::backend::{Autodiff, Backend, Dispatch, ExtensionType, backend_extension};
 use burn::tensor::Tensor;
 
-use super::node_poses::{Ends, NodeParameters};
+use super::node_poses::NodeParameters;
 use super::{for_all_back_ends, recorded};
 
 /// Weight of rotations relative to translations: a quaternion's component is larger than a share of the extent.
@@ -56,8 +56,6 @@ pub struct Regularization {
     pub smoothness: f32,
     /// In [0, 1].
     pub time: f32,
-    /// Ends of the trajectories, those of the nodes.
-    pub ends: Ends,
 }
 
 /// A back end's kernels. [`NodeRegularizerOps`] adds the dispatch and the tape.

@@ -51,7 +51,7 @@ fn many(gaussians: usize, config: NodesFieldConfig, device: &Device) -> DynamicS
     scene
 }
 
-fn configurations() -> [NodesFieldConfig; 8] {
+fn configurations() -> [NodesFieldConfig; 7] {
     let config = |count| NodesFieldConfig { count, ..NodesFieldConfig::default() };
     [
         config(9),
@@ -61,7 +61,6 @@ fn configurations() -> [NodesFieldConfig; 8] {
         NodesFieldConfig { affinities: 2, ..config(9) },
         NodesFieldConfig { affinities: 3, stillness: false, lifetime: true, ..config(7) },
         NodesFieldConfig { affinities: 2, lifetime: true, ..config(7) },
-        NodesFieldConfig { natural_ends: true, ..config(5) },
     ]
 }
 

@@ -3,7 +3,7 @@
 
 use burn::tensor::{Device, Tensor, TensorData};
 use glam::{DMat3, DQuat, DVec3};
-use light4gs_model::ops::node_poses::{Ends, NodeParameters, pose};
+use light4gs_model::ops::node_poses::{NodeParameters, pose};
 use light4gs_model::ops::node_regularizer::{Regularization, regularize};
 use light4gs_tests::golden::{assert_close, assert_close_relative, cpu_devices, devices, values_of};
 use light4gs_tests::random::Random;
@@ -62,7 +62,6 @@ impl Case {
             rotations: leaves[3].clone(),
             affinities: leaves.get(4).cloned(),
             unit: Tensor::from_floats([self.unit as f32], &device),
-            ends: Ends::Free,
         };
         let output = operation(parameters, self.time as f32);
         let weights: Vec<f32> = weights.iter().map(|weight| *weight as f32).collect();
@@ -148,7 +147,7 @@ const SMOOTHNESS: f64 = 0.5;
 
 fn regularized(parameters: NodeParameters, time: f32) -> Tensor<1> {
     let (rigidity, smoothness) = (RIGIDITY as f32, SMOOTHNESS as f32);
-    regularize(parameters, Regularization { rigidity, smoothness, time, ends: Ends::Free })
+    regularize(parameters, Regularization { rigidity, smoothness, time })
 }
 
 /// One node, groups of nodes that are not full, as many as a workgroup has and one more; the fewest knots; both ends of time.
@@ -269,7 +268,6 @@ fn a_wrong_shape_is_named() {
         rotations: zeros([5, 20]),
         affinities: None,
         unit: Tensor::ones([1], &device),
-        ends: Ends::Free,
     };
     pose(parameters, 0.5);
 }

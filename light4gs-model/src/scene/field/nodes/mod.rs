@@ -39,7 +39,7 @@ pub use lifetime::LIFETIME;
 
 use super::{DeformationField, FinePosition, LearningRate, Moment, SceneAtRest, ScenePoints};
 use crate::ops::columns::columns;
-use crate::ops::node_poses::{Ends, NodeParameters, pose};
+use crate::ops::node_poses::{NodeParameters, pose};
 use crate::ops::node_regularizer::{Regularization, regularize};
 pub use crate::ops::skinning::MOST_AFFINITIES;
 use crate::ops::skinning::{SkinningInputs, skin};
@@ -71,8 +71,6 @@ keys! {
         count: usize = 32; Whole { least: 1, most: MOST_NODES as u64 }, "ours; SC-GS: 512";
         /// Training times between two knots of a trajectory.
         times_a_knot: f64 = 4.0; Number { least: 0.1, most: 1e6 }, "ours";
-        /// Trajectories do not bend at their ends: the first knot and the last follow from their neighbors.
-        natural_ends: bool = false; Flag, "ours";
         /// A node's radius at the beginning, as a share of the distance to the nearest other one.
         radius: f64 = 0.6; Number { least: 0.01, most: 100.0 }, "ours";
         /// Nodes are placed at Gaussians with at least this opacity.
@@ -163,10 +161,6 @@ impl NodesField {
         self.translations.dims()[0]
     }
 
-    fn ends(&self) -> Ends {
-        if self.config.natural_ends { Ends::Natural } else { Ends::Free }
-    }
-
     fn parameters(&self) -> NodeParameters {
         NodeParameters {
             anchors: self.anchors.val(),
@@ -175,7 +169,6 @@ impl NodesField {
             rotations: self.rotations.val(),
             affinities: self.affinities.as_ref().map(|affinities| affinities.val()),
             unit: self.unit.val(),
-            ends: self.ends(),
         }
     }
 
@@ -260,7 +253,7 @@ impl DeformationField for NodesField {
 
     fn regularizer(&self, _: &SceneAtRest<'_>, position: &FinePosition) -> Option<Tensor<1>> {
         let [rigidity, smoothness] = [self.config.rigidity, self.config.smoothness].map(|weight| weight as f32);
-        let regularization = Regularization { rigidity, smoothness, time: position.random_time(), ends: self.ends() };
+        let regularization = Regularization { rigidity, smoothness, time: position.random_time() };
         (rigidity > 0.0 || smoothness > 0.0).then(|| regularize(self.parameters(), regularization))
     }
 

@@ -13,7 +13,6 @@ use super::{
     AFFINITY, LIFETIME, MOST_AFFINITIES, MOST_KNOTS, MOST_NODES, NodesField, NodesFieldConfig, STILLNESS, lifetime,
     numbers, tensor,
 };
-use crate::ops::node_poses::Ends;
 use crate::scene::ModelError;
 use crate::scene::field::DeformationField;
 
@@ -308,21 +307,9 @@ impl NodesField {
         let anchors = description.network.constant(time, 1, anchors);
         let basis = description.basis(time, self.knots());
         let unit = self.unit.val().unsqueeze();
-        let translations = by_component(self.knots_of_file(&self.translations) * unit, nodes);
-        let rotations = by_component(self.knots_of_file(&self.rotations), nodes);
+        let translations = by_component(self.translations.val() * unit, nodes);
+        let rotations = by_component(self.rotations.val(), nodes);
         (anchors, description.poses(basis, anchors, translations, rotations))
-    }
-
-    /// Knots with ends of their own, as files have them.
-    fn knots_of_file(&self, knots: &Param<Tensor<2>>) -> Tensor<2> {
-        let knots = knots.val();
-        if self.ends() == Ends::Free {
-            return knots;
-        }
-        let row = |k: usize| knots.clone().slice(k..k + 1);
-        let count = knots.dims()[0];
-        let [begin, end] = [[1, 2], [count - 2, count - 3]].map(|[near, far]| row(near) * 2.0 - row(far));
-        Tensor::cat(vec![begin, knots.clone().slice(1..count - 1), end], 0)
     }
 
     /// The field that a file describes. The settings of its training are not in a file.
