@@ -4,6 +4,7 @@ use super::NetworkLayout;
 
 /// Places of channels in a workgroup's memory.
 #[derive(Debug)]
+#[cfg_attr(not(feature = "wgpu"), allow(dead_code, reason = "without kernels of a GPU only the end is asked for"))]
 pub(super) struct Slots {
     /// The first channel of the features, or of their gradient.
     pub(super) features: usize,
