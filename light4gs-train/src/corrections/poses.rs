@@ -108,21 +108,28 @@ fn quaternion_matrix(w: Vec3) -> [f32; 16] {
     [0.0, x, y, z, -x, 0.0, z, -y, -y, -z, 0.0, x, -z, y, -x, 0.0]
 }
 
-/// Removes what moves all cameras together as a rigid body, which images do not tell: a mean turn about the middle of the
-/// cameras, and a mean translation.
+/// Removes what images do not tell, or tell too weakly to be learned: what moves all cameras together as a rigid body (a mean
+/// turn about the middle of the cameras, and a mean translation), and a common scale about that middle. A scene that grows
+/// with its cameras looks the same; only its background and the first Gaussians hold it, and a rig was seen to drift.
 pub(super) fn without_common_motion(values: &mut [[f32; 6]], cameras: &[Camera]) {
     let poses: Vec<Pose> = values.iter().map(|values| Pose::of(*values)).collect();
     let mean = |of: &dyn Fn(&Pose, &Camera) -> Vec3| {
         poses.iter().zip(cameras).map(|(pose, camera)| of(pose, camera)).sum::<Vec3>() / poses.len() as f32
     };
     // In world axes. To first order a camera's center moves against its translation.
+    let moved = |pose: &Pose, camera: &Camera| -(camera.rotation.transpose() * Vec3::from(pose.translation));
     let turn = mean(&|pose, camera| camera.rotation.transpose() * Vec3::from(pose.rotation));
-    let shift = mean(&|pose, camera| -(camera.rotation.transpose() * Vec3::from(pose.translation)));
+    let shift = mean(&moved);
     let middle = mean(&|_, camera| camera.center());
+    // Least squares, where cameras are not all in one place.
+    let along = mean(&|pose, camera| Vec3::splat(moved(pose, camera).dot(camera.center() - middle))).x;
+    let spread = mean(&|_, camera| Vec3::splat(camera.center().distance_squared(middle))).x;
+    let growth = if spread > 0.0 { along / spread } else { 0.0 };
     for (values, camera) in values.iter_mut().zip(cameras) {
         let [a, b, c] = (camera.rotation * turn).to_array();
+        let from_middle = camera.center() - middle;
         // Turned by -turn, cameras go round the middle.
-        let moved = shift - turn.cross(camera.center() - middle);
+        let moved = shift - turn.cross(from_middle) + growth * from_middle;
         let [x, y, z] = (camera.rotation * moved).to_array();
         for (value, change) in values.iter_mut().zip([-a, -b, -c, x, y, z]) {
             *value += change;
