@@ -50,6 +50,7 @@
 //! | [`scene`] | [`Gaussians`]; from world coordinates to [-1, 1] ([`SceneCoordinates`]); what moves the Gaussians ([`DeformationField`], and the paper's, [`HexPlaneField`]); the whole model ([`DynamicScene`]) | III-A |
 //! | [`planes`] | feature planes ([`FeaturePlanes`]) and their query; a plane over each pair of axes is a hexplane ([`HexPlaneConfig`]) | III-A |
 //! | [`Splatter`] | differentiable rendering | 3DGS |
+//! | [`Backdrop`] | Gaussians that are drawn with others and not trained | |
 //! | [`Significance`] | the contribution of each Gaussian over views and times | III-B |
 //! | [`context`] | the bits of every value of the planes: the multiscale hexplane [`ContextModel`] | III-C |
 //! | [`sh`] | the bits of every spherical harmonic: models behind [`ShEntropy`] | III-D |
@@ -73,6 +74,7 @@
 )]
 
 mod attribute_entropy;
+mod backdrop;
 pub mod context;
 pub mod entropy;
 #[cfg(feature = "wgpu")]
@@ -89,6 +91,7 @@ mod significance;
 mod splatter;
 
 pub use attribute_entropy::{AttributeEntropy, ChannelPrediction, CodedAttribute, GaussianPlaces};
+pub use backdrop::Backdrop;
 pub use context::*;
 pub use entropy::*;
 pub use gpu_error::GpuError;

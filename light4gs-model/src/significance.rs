@@ -83,11 +83,13 @@ impl Significance {
     /// If the number of Gaussians has changed.
     pub fn add(&mut self, splatter: &Splatter, gaussians: GaussianTensors, camera: &Camera) {
         let gaussians = gaussians.inner();
+        let count = gaussians.means.dims()[0];
         let (inputs, view) = splatter.inputs(gaussians.activated(), camera, None);
         let values = burn::tensor::Tensor::<2>::from_dispatch(Dispatch::significance(inputs, view)).into_data();
         let values: Vec<f32> = values.iter().collect();
         let (rows, _) = values.as_chunks::<3>();
-        assert_eq!(rows.len(), self.sums.len(), "the number of Gaussians has changed");
+        assert_eq!(count, self.sums.len(), "the number of Gaussians has changed");
+        // A backdrop's rows follow.
         for (sums, row) in self.sums.iter_mut().zip(rows) {
             for (sum, value) in sums.iter_mut().zip(row) {
                 *sum += f64::from(*value);

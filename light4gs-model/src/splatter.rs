@@ -6,6 +6,7 @@ use burn::backend::Dispatch;
 use burn::tensor::{Bool, Int, Tensor};
 use light4gs_data::Camera;
 
+use crate::backdrop::Backdrop;
 use crate::ops::columns::columns;
 use crate::ops::splat::{SplatInputs, SplatOps, SplatView};
 use crate::scene::gaussians::{ActivatedGaussians, GaussianTensors};
@@ -54,18 +55,25 @@ impl Rendering {
 /// let rendering = Splatter::new([1.0; 3], 3).render(gaussians.tensors(), &camera, None);
 /// assert_eq!(rendering.image.dims(), [30, 40, 3]);
 /// ```
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq)]
 pub struct Splatter {
     background: [f32; 3],
     sh_degree: usize,
     room: Option<usize>,
+    backdrop: Option<Backdrop>,
 }
 
 impl Splatter {
     /// `sh_degree` is the active degree: coefficients above it are ignored. A degree above that of the Gaussians means
     /// theirs.
     pub fn new(background: [f32; 3], sh_degree: usize) -> Self {
-        Self { background, sh_degree, room: None }
+        Self { background, sh_degree, room: None, backdrop: None }
+    }
+
+    /// Draws other Gaussians with those of every call: they hide and are hidden, but results and gradients are about the
+    /// Gaussians of the call.
+    pub fn with_backdrop(self, backdrop: Option<Backdrop>) -> Self {
+        Self { backdrop, ..self }
     }
 
     /// Reserves room for this number of [`Rendering::intersections`], so that the host need not wait until a GPU has counted
@@ -96,10 +104,12 @@ impl Splatter {
         camera: &Camera,
         screen_offsets: Option<Tensor<2>>,
     ) -> Rendering {
+        let own = gaussians.means.dims()[0];
         let (inputs, view) = self.inputs(gaussians, camera, screen_offsets);
         let outputs = Dispatch::splat(inputs, view);
         let rendering = Tensor::<1>::from_dispatch(outputs.rendering);
         let [radii, intersections] = [outputs.radii, outputs.intersections].map(Tensor::<1, Int>::from_dispatch);
+        let radii = if self.backdrop.is_some() { radii.narrow(0, 0, own) } else { radii };
         let (width, height) = (camera.width as usize, camera.height as usize);
         let pixels = width * height;
         // Channel by channel: those of all pixels are columns of a matrix with one row.
@@ -115,7 +125,7 @@ impl Splatter {
     }
 
     /// The inputs of the operations on one image, for programs that call the operations of [`ops`](crate::ops)
-    /// themselves.
+    /// themselves. Where there is a backdrop, its Gaussians follow those of the call.
     ///
     /// # Panics
     /// If the shapes do not fit together; the message names the tensor.
@@ -138,14 +148,19 @@ impl Splatter {
         assert_eq!(screen_offsets.dims(), [count, 2], "screen_offsets must be [N, 2]");
 
         let sh_degree = self.sh_degree.min((rest + 1).isqrt() - 1);
+        let own = ActivatedGaussians { means, quats, scales, opacities, sh_dc, sh_rest };
+        let (gaussians, screen_offsets, sh_degree) = match &self.backdrop {
+            Some(backdrop) => backdrop.behind(own, screen_offsets, sh_degree),
+            None => (own, screen_offsets, sh_degree),
+        };
         let view = SplatView { room: self.room, ..SplatView::new(*camera, self.background, sh_degree) };
         let inputs = SplatInputs {
-            means: means.into_dispatch(),
-            quats: quats.into_dispatch(),
-            scales: scales.into_dispatch(),
-            opacities: opacities.into_dispatch(),
-            sh_dc: sh_dc.into_dispatch(),
-            sh_rest: sh_rest.into_dispatch(),
+            means: gaussians.means.into_dispatch(),
+            quats: gaussians.quats.into_dispatch(),
+            scales: gaussians.scales.into_dispatch(),
+            opacities: gaussians.opacities.into_dispatch(),
+            sh_dc: gaussians.sh_dc.into_dispatch(),
+            sh_rest: gaussians.sh_rest.into_dispatch(),
             screen_offsets: screen_offsets.into_dispatch(),
         };
         (inputs, view)

@@ -16,6 +16,7 @@
 //! | use another model of motion | [`Trainer::builder_with_field`](trainer::Trainer::builder_with_field) |
 //! | use entropy models of your own | [`EntropyModels`](compression::EntropyModels) |
 //! | follow a run: logs, progress, images | [`Observer`](observers::Observer); [`ViewSource`](view_source::ViewSource) gives a viewer its newest state |
+//! | train a capture of minutes as a base and segments | [`take`] |
 //! | measure a file | [`DecodedScene`](evaluation::DecodedScene), [`metrics`] |
 //! | make a file of a scene that another program has trained | [`import`], then [`code_scene`](compression::code_scene) |
 //! | know beforehand how long a training takes | [`Pace`](pace::Pace) |
@@ -83,6 +84,7 @@ pub mod run;
 pub mod sampling;
 mod stage;
 pub mod table;
+pub mod take;
 pub mod trainer;
 pub mod utc;
 pub mod view_source;

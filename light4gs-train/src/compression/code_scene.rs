@@ -8,12 +8,12 @@ use burn::tensor::Device;
 use light4gs_codec::{Encoded, Kind, PlaneBytes, Profile, SceneData, StreamInfo};
 use light4gs_data::{Frame, Scene};
 use light4gs_model::attributes::SH_REST;
-use light4gs_model::{BuiltInField, DeformationField, DynamicScene, PlaneEntropy, Splatter};
+use light4gs_model::{Backdrop, BuiltInField, DeformationField, DynamicScene, PlaneEntropy, Splatter};
 use serde::{Deserialize, Serialize};
 
 use super::{
     AttributeRecord, BitEstimate, BitMap, Compression, CompressionOf, ConfiguredModels, EntropyModels, MissedQuality,
-    SearchImages, ShModel, encode, fit, mean_psnr, measured_views, plane_and_sh_step_search,
+    SearchImages, ShModel, encode, fit, mean_psnr, measured_views, splatter_of, plane_and_sh_step_search,
 };
 use crate::config::{CompressionConfig, Config, FileProfile};
 use crate::dataset::{ImageSource, scene_meta};
@@ -128,6 +128,8 @@ pub struct TrainedScene<'a, F: DeformationField = BuiltInField, E: EntropyModels
     pub data: &'a Scene,
     /// Its images, if there are any. Without images the scene is assumed to be [`ASSUMED_PSNR`] from the true ones.
     pub images: Option<&'a dyn ImageSource>,
+    /// What is drawn with the scene and is not in its file: the base of a take, for one of its segments.
+    pub backdrop: Option<&'a Backdrop>,
     /// With autodiff.
     pub device: &'a Device,
 }
@@ -174,12 +176,12 @@ pub fn code_scene<F: DeformationField, E: EntropyModels>(
     let (views, device) = (search_views(dataset), trained.device.clone().inner());
     let render = |data: &SceneData| {
         let scene = DynamicScene::<F>::from_arrays(data, &device).expect("arrays that came from a model make one");
-        render_views(&scene, data, &views)
+        render_views(&scene, &trained.splatter(data), &views)
     };
     let psnr = |data: &SceneData| trained.measured_psnr(data, &device);
     let mut images = None;
     if profile == Profile::Compact && searches(&config.compression, trained.compression) {
-        let exact = render_views(&decodable::<F>(&data, &device)?, &data, &views);
+        let exact = render_views(&decodable::<F>(&data, &device)?, &trained.splatter(&data), &views);
         let error = trained.squared_error(&exact, &views)?;
         let blank = is_blank(&exact, data.meta.background);
         images = Some(SearchImages { render: &render, exact, blank, error, psnr: &psnr });
@@ -226,7 +228,12 @@ impl<F: DeformationField, E: EntropyModels> TrainedScene<'_, F, E> {
     pub fn is_seen(&self) -> Result<bool, TrainError> {
         let scene = self.scene.clone().valid();
         let data = scene.to_arrays(scene_meta(self.config, self.data))?;
-        Ok(!is_blank(&render_views(&scene, &data, &search_views(self.data)), data.meta.background))
+        Ok(!is_blank(&render_views(&scene, &self.splatter(&data), &search_views(self.data)), data.meta.background))
+    }
+
+    /// Draws the scene whose arrays are `data`, with what is behind it.
+    fn splatter(&self, data: &SceneData) -> Splatter {
+        splatter_of(data).with_backdrop(self.backdrop.cloned())
     }
 
     /// Fits models to the scene, whose arrays are `data`; with images, it searches the steps of planes and harmonics first.
@@ -266,7 +273,7 @@ impl<F: DeformationField, E: EntropyModels> TrainedScene<'_, F, E> {
                     .into(),
             ));
         };
-        mean_psnr::<F>(decoded, measured_views(self.data), images, device)
+        mean_psnr::<F>(decoded, &self.splatter(decoded), measured_views(self.data), images, device)
     }
 }
 
@@ -329,9 +336,8 @@ fn search_views(data: &Scene) -> Vec<&Frame> {
     data.train.iter().step_by(stride).collect()
 }
 
-/// Pixel values of all views of a scene, whose arrays are `data`, clamped to [0, 1].
-fn render_views<F: DeformationField>(scene: &DynamicScene<F>, data: &SceneData, views: &[&Frame]) -> Vec<f32> {
-    let splatter = Splatter::new(data.meta.background, usize::from(data.gaussians.sh_degree));
+/// Pixel values of all views of a scene, clamped to [0, 1].
+fn render_views<F: DeformationField>(scene: &DynamicScene<F>, splatter: &Splatter, views: &[&Frame]) -> Vec<f32> {
     let image = |frame: &&Frame| {
         let image = splatter.render(scene.at(frame.time), &frame.camera, None).image;
         image.clamp(0.0, 1.0).into_data().iter::<f32>().collect::<Vec<_>>()

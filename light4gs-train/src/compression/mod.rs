@@ -39,7 +39,7 @@ pub use encoder::{
 };
 pub use fit::fit;
 pub use models::{ConfiguredModels, EntropyModels, ShModel};
-pub use quality::{mean_psnr, measured_views};
+pub use quality::{mean_psnr, measured_views, splatter_of};
 pub use rate::{NoisyScene, Rate};
 pub use step_factor::MissedQuality;
 

@@ -15,18 +15,24 @@ pub fn measured_views(data: &Scene) -> &[Frame] {
     if data.test.is_empty() { &data.train } else { &data.test }
 }
 
-/// Mean PSNR over views, dB, of 8-bit renderings as an evaluation measures it. `device` is one without autodiff.
+/// Draws a decoded scene as an evaluation does: over its background, with all of its harmonics.
+pub fn splatter_of(data: &SceneData) -> Splatter {
+    Splatter::new(data.meta.background, usize::from(data.gaussians.sh_degree))
+}
+
+/// Mean PSNR over views, dB, of 8-bit renderings as an evaluation measures it. `splatter` draws them; `device` is one without
+/// autodiff.
 ///
 /// # Errors
 /// [`TrainError::Model`] if `F` cannot be made from `data`; [`TrainError::Data`] for an image that cannot be read.
 pub fn mean_psnr<'f, F: DeformationField>(
     data: &SceneData,
+    splatter: &Splatter,
     views: impl IntoIterator<Item = &'f Frame>,
     images: &dyn ImageSource,
     device: &Device,
 ) -> Result<f64, TrainError> {
     let scene = DynamicScene::<F>::from_arrays(data, device)?;
-    let splatter = Splatter::new(data.meta.background, usize::from(data.gaussians.sh_degree));
     let mut values = Vec::new();
     for frame in views {
         let image = splatter.render(scene.at(frame.time), &frame.camera, None).image;

@@ -69,6 +69,11 @@ keys! {
         frames: Option<usize> = None;
             WholeOrNone { least: 1, most: 1_000_000 },
             "reference, Neu3D: 300";
+        /// First and last time of the images that are used, as shares of the capture: of a take, those of a segment.
+        between: [f64; 2] = [0.0, 1.0]; List { element: &SHARE, length: Some(2) }, "ours";
+        /// At most this number of times is used, spread evenly. 0: all.
+        #[serde(with = "optional")]
+        most_times: Option<usize> = None; WholeOrNone { least: 1, most: 1_000_000 }, "ours";
         /// Larger images are reduced so that their longer side has this many pixels, keeping their shape. 0 leaves all as
         /// they are. `train --pixels` sets it.
         #[serde(with = "optional")]

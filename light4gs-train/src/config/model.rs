@@ -1,7 +1,9 @@
 //! `[model]`: what is trained.
 
-use light4gs_keys::Bounds::Whole;
-use light4gs_keys::keys;
+use std::path::PathBuf;
+
+use light4gs_keys::Bounds::{Text, Whole};
+use light4gs_keys::{keys, optional};
 use light4gs_model::{
     BuiltInFieldConfig, CoordinatesConfig, DeformationField, DynamicSceneConfig, FieldConfigs, FieldKind,
     GaussiansConfig,
@@ -14,6 +16,10 @@ keys! {
         sh_degree: u8 = 3; Whole { least: 0, most: 3 }, "3DGS";
         /// What moves the Gaussians. The keys of each field are in the tables below.
         field: FieldKind = FieldKind::HexPlane; FieldKind::BOUNDS, "paper";
+        /// A `.l4gs` file of a scene that stands still: its Gaussians are drawn with those of the run, and not trained.
+        /// Empty: none. `train --segment` sets it for the segments of a take.
+        #[serde(with = "optional")]
+        base: Option<PathBuf> = None; Text, "ours";
         /// From world coordinates to those of the planes.
         coordinates: CoordinatesConfig;
         /// The keys of the deformation fields.

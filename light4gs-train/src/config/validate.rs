@@ -13,6 +13,8 @@ use crate::density::PruneConfig;
 pub(super) fn validate(config: &Config) -> Result<(), ConfigError> {
     let mut check = Check { problems: Vec::new() };
     config.problems("", &mut check.problems);
+    let [from, to] = config.data.between;
+    check.that("data.between", from < to, || format!("is [{from}, {to}]; the first time must be before the last"));
     hexplane(&mut check, &config.model.fields.hexplane);
     train(&mut check, &config.train);
     guided_sampling(&mut check, config);

@@ -9,10 +9,10 @@ use std::time::Instant;
 use burn::tensor::{Device, Tensor};
 use light4gs_codec::{Decoded, Limits, OpenStream, SceneData, SectionInfo, StreamInfo, read_file_and};
 use light4gs_data::{Camera, Frame, RgbImage8, RgbImage32, Scene, Split};
-use light4gs_model::{BuiltInField, DeformationField, DynamicScene, Splatter};
+use light4gs_model::{Backdrop, BuiltInField, DeformationField, DynamicScene, Splatter};
 use serde::Serialize;
 
-use crate::compression::CodingRecord;
+use crate::compression::{CodingRecord, splatter_of};
 use crate::config::EvalConfig;
 use crate::corrections::{Fitted, ViewFit};
 use crate::dataset::ImageSource;
@@ -127,6 +127,8 @@ pub struct DecodedScene<F: DeformationField = BuiltInField> {
     pub info: StreamInfo,
     /// Seconds taken by decoding.
     pub decode_seconds: f64,
+    /// What is drawn behind it and is not in the file: the base of a take, for one of its segments.
+    pub backdrop: Option<Backdrop>,
     device: Device,
 }
 
@@ -151,7 +153,7 @@ impl<F: DeformationField> DecodedScene<F> {
         let Decoded { scene: data, info, .. } = read_file_and(path, limits, decode)?;
         let decode_seconds = begin.elapsed().as_secs_f64();
         let model = DynamicScene::from_arrays(&data, device)?;
-        Ok(Self { model, data, info, decode_seconds, device: device.clone() })
+        Ok(Self { model, data, info, decode_seconds, backdrop: None, device: device.clone() })
     }
 
     /// A fit to a frame, and the 8-bit image that it gives.
@@ -162,7 +164,7 @@ impl<F: DeformationField> DecodedScene<F> {
     }
 
     fn splatter(&self) -> Splatter {
-        Splatter::new(self.data.meta.background, usize::from(self.data.gaussians.sh_degree))
+        splatter_of(&self.data).with_backdrop(self.backdrop.clone())
     }
 
     /// Renders a frame's camera at its time; values are clamped to [0, 1].

@@ -15,6 +15,7 @@ use crate::device::{self, describe};
 use crate::error::TrainError;
 use crate::observers::metrics_log::read_metrics;
 use crate::run::RunFolder;
+use crate::take::backdrop_of;
 
 /// Measures the run's file on its own dataset, and writes `eval.json` and, where the configuration asks for them, the
 /// rendered views. Returns the results and the views.
@@ -29,7 +30,8 @@ pub fn measure_run<F: DeformationField>(
     scene: &Scene,
 ) -> Result<(Evaluation, Vec<RenderedView>), TrainError> {
     let device = device::open(config.device)?;
-    let decoded = DecodedScene::<F>::open_with_limits(&folder.stream(), &Limits::large(), &device)?;
+    let mut decoded = DecodedScene::<F>::open_with_limits(&folder.stream(), &Limits::large(), &device)?;
+    decoded.backdrop = backdrop_of(config, folder, &device)?;
     let images = image_store(config);
     let fit = Corrections::new(&config.train.corrections, scene, Schedule::default()).fit();
     let name = describe(config.device, &device);

@@ -17,10 +17,11 @@ pub(super) const RECORD: &str = "run.json";
 pub(super) const DATASET: &str = "dataset.json";
 
 /// Files of a run; `--overwrite` removes them, in this order.
-pub(super) const FILES: [&str; 10] = [
+pub(super) const FILES: [&str; 11] = [
     RECORD,
     "config.toml",
     DATASET,
+    "hidden.json",
     "metrics.jsonl",
     "scene.l4gs",
     "corrections.json",

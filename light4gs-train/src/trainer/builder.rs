@@ -7,9 +7,9 @@ use std::sync::atomic::AtomicBool;
 use burn::module::Module;
 use burn::tensor::Device;
 use light4gs_codec::checks;
-use light4gs_data::Scene;
+use light4gs_data::{PointCloud, Scene};
 use light4gs_model::attributes::{BUILT_IN, check_further};
-use light4gs_model::{Attribute, BuiltInField, DeformationField, DynamicSceneConfig, ModelError};
+use light4gs_model::{Attribute, Backdrop, BuiltInField, DeformationField, DynamicSceneConfig, ModelError};
 
 use super::Trainer;
 use super::background::Background;
@@ -32,6 +32,7 @@ use crate::regularizer::Regularizer;
 use crate::run::{Checkpoint, RunFolder};
 use crate::sampling::{CandidateFrames, FrameSampler};
 use crate::stage::Stage;
+use crate::take::{Base, HIDDEN, Start, backdrop_of};
 
 /// The parts of a [`Trainer`]. Parts that are not given are made as the configuration says.
 pub struct TrainerBuilder<F: DeformationField = BuiltInField, E: EntropyModels = ConfiguredModels> {
@@ -218,7 +219,9 @@ impl<F: DeformationField, E: EntropyModels> TrainerBuilder<F, E> {
             None => self.begin(device),
             Some(path) => {
                 let state = Checkpoint::load(&path, &self.config, &self.scene(), &self.models, &device)?;
-                self.assemble(device, state, Some(path))
+                let folder = self.folder.as_ref().expect("a checkpoint is in a folder");
+                let backdrop = backdrop_of(&self.config, folder, &device)?;
+                self.assemble(device, state, backdrop, Some(path))
             }
         }
     }
@@ -257,12 +260,26 @@ impl<F: DeformationField, E: EntropyModels> TrainerBuilder<F, E> {
     pub fn check(mut self) -> Result<(), TrainError> {
         self.folder = None;
         let device = self.open_device()?;
-        self.first_state(&device).map(|_| ())
+        // Where a segment begins needs its images, and every start can be encoded.
+        Base::of(&self.config)?;
+        self.first_state(&self.data.points, &device).map(|_| ())
     }
 
-    fn begin(self, device: Device) -> Result<Trainer<F, E>, TrainError> {
-        let state = self.first_state(&device)?;
-        self.assemble(device, state, None)
+    fn begin(mut self, device: Device) -> Result<Trainer<F, E>, TrainError> {
+        let Some(base) = Base::of(&self.config)? else {
+            let state = self.first_state(&self.data.points, &device)?;
+            return self.assemble(device, state, None, None);
+        };
+        let images = self.images.take().unwrap_or_else(|| Box::new(image_store(&self.config)));
+        let count = self.config.data.initial_points;
+        let plain = device.clone().inner();
+        let Start { hidden, points } = Start::of(&base, &self.data, &*images, count, self.config.seed, &plain)?;
+        self.images = Some(images);
+        if let Some(folder) = &self.folder {
+            folder.write_json(HIDDEN, &hidden)?;
+        }
+        let state = self.first_state(&points, &device)?;
+        self.assemble(device, state, Some(Backdrop::new(&base.without(&hidden)?, &plain)), None)
     }
 
     /// The configuration of the scene.
@@ -272,10 +289,10 @@ impl<F: DeformationField, E: EntropyModels> TrainerBuilder<F, E> {
         scene
     }
 
-    /// The state at the beginning of training.
-    fn first_state(&self, device: &Device) -> Result<Checkpoint<F, E>, TrainError> {
+    /// The state at the beginning of training, with Gaussians at these points.
+    fn first_state(&self, points: &PointCloud, device: &Device) -> Result<Checkpoint<F, E>, TrainError> {
         device.seed(self.config.seed);
-        let scene = self.scene().init(&self.data.points, device);
+        let scene = self.scene().init(points, device);
         let state = Checkpoint {
             compression: Compression::of_run(&self.models, &self.config, &scene, device)?,
             scene,
@@ -323,6 +340,7 @@ impl<F: DeformationField, E: EntropyModels> TrainerBuilder<F, E> {
         self,
         device: Device,
         mut state: Checkpoint<F, E>,
+        backdrop: Option<Backdrop>,
         checkpoint: Option<PathBuf>,
     ) -> Result<Trainer<F, E>, TrainError> {
         let Self { config, data, models, images, folder, observers, stop, .. } = self;
@@ -365,6 +383,7 @@ impl<F: DeformationField, E: EntropyModels> TrainerBuilder<F, E> {
             models,
             loss,
             corrections,
+            backdrop,
             density,
             significance,
             observers: all,

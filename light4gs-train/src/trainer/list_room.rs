@@ -31,7 +31,10 @@ impl ListRoom {
 
     /// The splatter of the next step.
     pub(super) fn reserve(&self, splatter: Splatter) -> Splatter {
-        self.room.map_or(splatter, |room| splatter.with_room_for(room))
+        match self.room {
+            Some(room) => splatter.with_room_for(room),
+            None => splatter,
+        }
     }
 
     /// Learns the number of intersections of each view of a step. Returns whether all had room; if not, the step must be
@@ -54,24 +57,24 @@ mod tests {
 
     #[test]
     fn room_follows_what_was_needed() {
-        let plain = Splatter::new([0.0; 3], 0);
+        let plain = || Splatter::new([0.0; 3], 0);
         let mut room = ListRoom::new(true);
-        assert_eq!(room.reserve(plain), plain);
+        assert_eq!(room.reserve(plain()), plain());
         assert!(room.learn(&[600, 1000]));
-        assert_eq!(room.reserve(plain), plain.with_room_for(1500));
+        assert_eq!(room.reserve(plain()), plain().with_room_for(1500));
         assert!(room.learn(&[1500, 7]));
-        assert_eq!(room.reserve(plain), plain.with_room_for(2250));
+        assert_eq!(room.reserve(plain()), plain().with_room_for(2250));
         assert!(!room.learn(&[2251]));
         assert!(room.learn(&[2251]));
         (0..1000).for_each(|_| assert!(room.learn(&[100])));
-        assert_eq!(room.reserve(plain), plain.with_room_for(150));
+        assert_eq!(room.reserve(plain()), plain().with_room_for(150));
     }
 
     #[test]
     fn what_has_room_for_all_reserves_nothing() {
-        let plain = Splatter::new([0.0; 3], 0);
+        let plain = || Splatter::new([0.0; 3], 0);
         let mut room = ListRoom::new(false);
         assert!([10, 1000, 10].iter().all(|most| room.learn(&[*most])));
-        assert_eq!(room.reserve(plain), plain);
+        assert_eq!(room.reserve(plain()), plain());
     }
 }

@@ -38,7 +38,7 @@ use std::time::Instant;
 use burn::module::Module;
 use burn::tensor::{Device, Tensor};
 use light4gs_data::{Frame, Scene, Split};
-use light4gs_model::{BuiltInField, DeformationField, DynamicScene, GaussianTensors, Splatter};
+use light4gs_model::{Backdrop, BuiltInField, DeformationField, DynamicScene, GaussianTensors, Splatter};
 
 pub use builder::TrainerBuilder;
 
@@ -122,6 +122,7 @@ pub struct Trainer<F: DeformationField = BuiltInField, E: EntropyModels = Config
     models: E,
     loss: Box<dyn Loss>,
     corrections: Corrections,
+    backdrop: Option<Backdrop>,
     density: Box<dyn DensityStrategy>,
     significance: Box<dyn SignificanceScore>,
     observers: Vec<Box<dyn Observer>>,
@@ -242,6 +243,7 @@ impl<F: DeformationField, E: EntropyModels> Trainer<F, E> {
             config: &self.config,
             data: &self.data,
             images: Some(&*self.images),
+            backdrop: self.backdrop.as_ref(),
             device: &self.device,
         };
         let (observers, stop, folder) = (&mut self.observers, &self.stop, self.folder.as_ref());
@@ -408,7 +410,7 @@ impl<F: DeformationField, E: EntropyModels> Trainer<F, E> {
     fn splatter(&self, stage: Stage, iteration: usize) -> Splatter {
         let step = self.config.train.global_step(stage, iteration);
         let degree = (step / self.config.train.sh_degree_interval.max(1)).min(usize::from(self.config.model.sh_degree));
-        Splatter::new(self.data.background, degree)
+        Splatter::new(self.data.background, degree).with_backdrop(self.backdrop.clone())
     }
 
     /// PSNR of a few test views, rendered from the model in memory, if it is due.

@@ -4,7 +4,7 @@ use light4gs_codec::Encoded;
 use light4gs_model::DeformationField;
 
 use super::Trainer;
-use crate::compression::{EntropyModels, mean_psnr, measured_views};
+use crate::compression::{EntropyModels, mean_psnr, measured_views, splatter_of};
 use crate::error::TrainError;
 
 /// Corrections per fine stage.
@@ -75,6 +75,7 @@ impl<F: DeformationField, E: EntropyModels> Trainer<F, E> {
     fn psnr_of(&self, file: &Encoded) -> Result<f64, TrainError> {
         let views = measured_views(&self.data);
         let views = views.iter().step_by((views.len() / VIEWS).max(1));
-        mean_psnr::<F>(&file.decoded, views, &*self.images, &self.device.clone().inner())
+        let splatter = splatter_of(&file.decoded).with_backdrop(self.backdrop.clone());
+        mean_psnr::<F>(&file.decoded, &splatter, views, &*self.images, &self.device.clone().inner())
     }
 }

@@ -20,6 +20,7 @@ use light4gs_train::evaluation::section_sizes;
 use light4gs_train::import::scene_around;
 use light4gs_train::run::Checkpoint;
 use light4gs_train::run::RunFolder;
+use light4gs_train::take::backdrop_of;
 use safetensors::Dtype;
 use safetensors::tensor::TensorView;
 use serde_json::json;
@@ -103,6 +104,7 @@ impl Encode {
             models.attributes = None;
         }
         let images = image_store(&config);
+        let backdrop = backdrop_of(&config, &folder, &device)?;
         let trained = TrainedScene {
             scene: &checkpoint.scene,
             compression: compression.as_ref(),
@@ -110,6 +112,7 @@ impl Encode {
             config: &changed,
             data: &data,
             images: record.scene.is_some().then_some(&images),
+            backdrop: backdrop.as_ref(),
             device: &device,
         };
         let coded = code_to_file(&trained, &self.out, self.json).map_err(|error| match error {

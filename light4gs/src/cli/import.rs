@@ -121,6 +121,7 @@ impl Import {
             config: &config,
             data: &data,
             images: self.scene.is_some().then_some(&images),
+            backdrop: None,
             device: &device,
         };
         code_to_file(&trained, &self.out, self.json).map(|_| ())

@@ -7,6 +7,7 @@ mod container;
 mod export;
 mod gpu_errors;
 mod import;
+mod launch;
 mod limits;
 mod output;
 mod prepare;
@@ -15,6 +16,7 @@ mod render;
 mod signals;
 mod study;
 mod synth;
+mod take;
 mod train;
 mod videos;
 mod view;
@@ -105,6 +107,12 @@ enum Command {
     /// One task of a study, as its launcher starts it.
     #[command(hide = true)]
     StudyTask(study::StudyTask),
+    /// Write the file of a take from the segments that are trained: the first half plays while the second is in training.
+    #[command(after_help = "Example:\n  light4gs join runs/walk")]
+    Join(take::Join),
+    /// One task of a take, as its launcher starts it.
+    #[command(hide = true)]
+    TakeTask(take::TakeTask),
     /// Print what differs between runs: program and machine, configuration, results.
     #[command(after_help = "Example:\n  light4gs compare runs/one runs/other")]
     Compare(compare::Compare),
@@ -137,6 +145,8 @@ impl Cli {
             Command::Study(command) => command.run(),
             Command::Gather(command) => command.run(),
             Command::StudyTask(command) => command.run(),
+            Command::Join(command) => command.run(),
+            Command::TakeTask(command) => command.run(),
             Command::Compare(command) => command.run(),
             Command::Bench(command) => command.run(),
         }

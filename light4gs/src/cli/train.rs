@@ -20,10 +20,12 @@ use light4gs_train::table::{Align, Table};
 use light4gs_train::trainer::{Trainer, TrainerBuilder};
 
 use super::check::{refuse_problems, tell_capture, understand};
+use super::launch::{LaunchOptions, Launcher};
 use super::limits::LimitsArgument;
 use super::output::progress::ProgressBars;
 use super::output::{say, say_json, tell};
 use super::signals::stop_flag;
+use super::take::train_take;
 use super::videos;
 use super::wishes::{Wishes, check_quality};
 
@@ -66,6 +68,12 @@ pub(super) struct Train {
     device: Option<DeviceName>,
     #[command(flatten)]
     wishes: Wishes,
+    /// Train a take: a base that stands still, and segments of about so many seconds, which play as one file. For captures of more
+    /// than some ten seconds. The same command goes on where it was stopped.
+    #[arg(long, value_name = "SECONDS", value_parser = seconds)]
+    segment: Option<f64>,
+    #[command(flatten)]
+    launch: LaunchOptions,
     /// Replace an existing run.
     #[arg(long)]
     overwrite: bool,
@@ -90,9 +98,21 @@ impl Train {
             (None, Some(layout)) => Config::preset_of(Layouts::default().by_name(&layout)?)?.to_owned(),
             (None, None) => Config::preset_of(Layouts::default().detect(&scene)?)?.to_owned(),
         };
+        if self.segment.is_none() && (self.launch.jobs > 1 || self.launch.launcher != Launcher::Local) {
+            return Err(TrainError::Input("--jobs and --launcher are for takes; give --segment SECONDS too".into()));
+        }
         let config = self.wishes.config(&preset, &overrides, &scene, automatic, self.output.quiet)?;
-        train(config, &scene, &self.out, self.overwrite, &self.output)
+        match self.segment {
+            Some(segment) => train_take(&config, &scene, &self.out, segment, &self.launch, self.output.quiet),
+            None => train(config, &scene, &self.out, self.overwrite, &self.output),
+        }
     }
+}
+
+/// The length of a segment.
+fn seconds(text: &str) -> Result<f64, String> {
+    let seconds = text.parse::<f64>().ok().filter(|seconds| (0.1..=600.0).contains(seconds));
+    seconds.ok_or_else(|| "expected seconds, from 0.1 to 600".to_owned())
 }
 
 /// Trains a new run and measures it, up to the report.

@@ -377,6 +377,7 @@ fn a_coded_checkpoint_costs_no_more_than_0_05_db() {
         config: &read,
         data: &data,
         images: None,
+        backdrop: None,
         device: &device,
     };
     let coded = code_scene(&trained, &mut |_, _| Ok(())).unwrap();
@@ -410,6 +411,7 @@ fn a_ply_becomes_a_file_that_renders_alike() {
         config: &config,
         data: &data,
         images: None,
+        backdrop: None,
         device: &device,
     };
     let coded = code_scene(&trained, &mut |_, _| Ok(())).unwrap();

@@ -248,11 +248,6 @@ impl StudyFolder {
         )))
     }
 
-    /// The file for a task's output.
-    pub fn log(&self, task: usize) -> PathBuf {
-        self.path(LOGS).join(format!("task-{task}.log"))
-    }
-
     /// The file for the message of a task that failed.
     pub fn failure(&self, task: usize) -> PathBuf {
         self.path(LOGS).join(format!("task-{task}.failed"))

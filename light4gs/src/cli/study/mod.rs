@@ -1,14 +1,12 @@
 //! `study` and `gather`, and the task that launchers start.
 
 mod gather;
-mod local;
-mod slurm;
 mod task;
 
 use std::collections::BTreeSet;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
-use clap::{Args, ValueEnum};
+use clap::Args;
 use light4gs_lab::study::manifest::{Manifest, ManifestRun, StudyFolder};
 use light4gs_lab::study::plan::{Plan, PlanOptions};
 use light4gs_lab::study::results::is_finished;
@@ -23,15 +21,20 @@ use serde::Serialize;
 pub(super) use gather::Gather;
 pub(super) use task::StudyTask;
 
+use super::launch::{LaunchOptions, Launcher, TaskFolder, local, slurm};
 use super::output::{say, say_json};
 
-/// The launcher of the tasks.
-#[derive(Clone, Copy, Debug, ValueEnum)]
-enum Launcher {
-    /// Processes on this machine.
-    Local,
-    /// A job array on a Slurm cluster; the command returns when it is submitted.
-    Slurm,
+impl TaskFolder for StudyFolder {
+    const TASK: &'static str = "study-task";
+    const GATHER: &'static str = "gather";
+
+    fn root(&self) -> &Path {
+        self.root()
+    }
+
+    fn failure(&self, task: usize) -> PathBuf {
+        self.failure(task)
+    }
 }
 
 #[derive(Debug, Args)]
@@ -70,15 +73,8 @@ pub(super) struct Study {
     /// Print the runs, without training.
     #[arg(long)]
     dry_run: bool,
-    /// The launcher of the tasks.
-    #[arg(long, value_enum, default_value = "local")]
-    launcher: Launcher,
-    /// Tasks at a time.
-    #[arg(long, default_value_t = 1, value_parser = clap::value_parser!(u32).range(1..=10_000))]
-    jobs: u32,
-    /// TOML file with partition, account, GPUs a task and wall time; see docs/studies.md.
-    #[arg(long, value_name = "FILE")]
-    slurm: Option<PathBuf>,
+    #[command(flatten)]
+    launch: LaunchOptions,
     /// Print the results as JSON.
     #[arg(long)]
     json: bool,
@@ -106,22 +102,17 @@ impl Study {
         if self.dry_run {
             return dry_run(&plan, &selection, self.out, self.json);
         }
-        if self.slurm.is_some() && !matches!(self.launcher, Launcher::Slurm) {
-            return Err(TrainError::Input("--slurm is for --launcher slurm; give that too, or leave it out".into()));
-        }
-        let settings = self.slurm.as_deref().map(slurm::Settings::load).transpose()?;
+        let settings = self.launch.settings()?;
         let out = self.out.ok_or_else(|| TrainError::Input("--out is missing: the folder for the runs".into()))?;
         let (folder, manifest) = StudyFolder::create(&out, &plan)?;
-        match self.launcher {
+        let tasks = unfinished(&folder, &manifest, &selection);
+        let jobs = self.launch.jobs;
+        match self.launch.launcher {
             Launcher::Local => {
-                let tasks = unfinished(&folder, &manifest, &selection);
-                local::run_all(&folder, tasks, self.jobs as usize, self.quiet || self.json)?;
+                local::run_all(&folder, tasks, jobs as usize, self.quiet || self.json)?;
                 gather::gather(&folder, &manifest, &selection, self.json)
             }
-            Launcher::Slurm => {
-                let tasks = unfinished(&folder, &manifest, &selection);
-                slurm::submit(&folder, &tasks, self.jobs, &settings.unwrap_or_default())
-            }
+            Launcher::Slurm => slurm::submit(&folder, &[tasks], jobs, &settings),
         }
     }
 }

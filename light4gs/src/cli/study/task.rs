@@ -1,7 +1,6 @@
 //! One task: a training, and the runs that differ from it only in how the file is written.
 
-use std::path::{Path, PathBuf};
-use std::time::Duration;
+use std::path::PathBuf;
 
 use clap::Args;
 use light4gs_lab::study::manifest::{Manifest, StudyFolder};
@@ -9,12 +8,10 @@ use light4gs_lab::study::results::is_finished;
 use light4gs_lab::study::reuse::find_trained;
 use light4gs_train::error::TrainError;
 
+use super::super::launch::{noting_failure, when_free};
 use super::super::output::tell;
 use super::super::signals::stop_flag;
 use super::super::train::{RunOutput, train_to_evaluation};
-
-/// Time between two attempts to lock a run that another process holds.
-const PAUSE: Duration = Duration::from_millis(500);
 
 #[derive(Debug, Args)]
 pub(in crate::cli) struct StudyTask {
@@ -40,16 +37,7 @@ impl StudyTask {
                 self.task
             )));
         }
-        let failure = folder.failure(self.task);
-        // The message of an earlier attempt.
-        let _ = std::fs::remove_file(&failure);
-        let result = run_task(&folder, &manifest, self.task, self.quiet);
-        match &result {
-            Ok(()) | Err(TrainError::Stopped(_)) => {}
-            // For the summary. If the message cannot be written, the summary shows only the state of the run.
-            Err(error) => drop(std::fs::write(&failure, format!("{error}\n"))),
-        }
-        result
+        noting_failure(&folder, self.task, || run_task(&folder, &manifest, self.task, self.quiet))
     }
 }
 
@@ -73,27 +61,4 @@ fn run_task(folder: &StudyFolder, manifest: &Manifest, task: usize, quiet: bool)
         trained.get_or_insert(path);
     }
     Ok(())
-}
-
-/// Runs `train`; while another process holds the run, waits for it. That may be the same task on a node that was lost.
-fn when_free(run: &Path, train: impl Fn() -> Result<(), TrainError>) -> Result<(), TrainError> {
-    let stop = stop_flag();
-    let mut told = false;
-    loop {
-        match train() {
-            Err(error @ (TrainError::RunInUse { .. } | TrainError::RunExists(_))) => {
-                if stop.load(std::sync::atomic::Ordering::Relaxed) {
-                    return Err(TrainError::Stopped(format!("stopped on request: {error}")));
-                }
-                if !std::mem::replace(&mut told, true) {
-                    tell(format_args!("waiting: {error}"));
-                }
-                std::thread::sleep(PAUSE);
-                if is_finished(run) {
-                    return Ok(());
-                }
-            }
-            result => return result,
-        }
-    }
 }

@@ -6,11 +6,11 @@ use std::sync::atomic::Ordering;
 use std::time::Duration;
 
 use light4gs_data::DataError;
-use light4gs_lab::study::manifest::StudyFolder;
 use light4gs_train::error::TrainError;
 
 use super::super::output::tell;
 use super::super::signals::stop_flag;
+use super::TaskFolder;
 
 /// Time between two checks of the processes.
 const PAUSE: Duration = Duration::from_millis(50);
@@ -25,7 +25,12 @@ struct Running {
 ///
 /// # Errors
 /// [`TrainError::Stopped`] if requested; a process that cannot be started.
-pub(super) fn run_all(folder: &StudyFolder, tasks: Vec<usize>, jobs: usize, quiet: bool) -> Result<(), TrainError> {
+pub(in crate::cli) fn run_all<T: TaskFolder>(
+    folder: &T,
+    tasks: Vec<usize>,
+    jobs: usize,
+    quiet: bool,
+) -> Result<(), TrainError> {
     let stop = stop_flag();
     let mut waiting = tasks.into_iter();
     let mut running: Vec<Running> = Vec::new();
@@ -66,11 +71,11 @@ pub(super) fn run_all(folder: &StudyFolder, tasks: Vec<usize>, jobs: usize, quie
     }
 }
 
-fn start(folder: &StudyFolder, task: usize, jobs: usize, quiet: bool) -> Result<Child, TrainError> {
+fn start<T: TaskFolder>(folder: &T, task: usize, jobs: usize, quiet: bool) -> Result<Child, TrainError> {
     let failed = |error| TrainError::Input(format!("cannot start task {task}: {error}"));
     let program = std::env::current_exe().map_err(failed)?;
     let mut command = Command::new(program);
-    command.arg("study-task").arg(folder.root()).arg(task.to_string()).stdin(Stdio::null());
+    command.arg(T::TASK).arg(folder.root()).arg(task.to_string()).stdin(Stdio::null());
     // Standard output is for the tables.
     command.stdout(Stdio::null());
     if jobs > 1 {
@@ -97,7 +102,7 @@ fn ask_to_stop(process: &Child) {
 }
 
 /// Reports a task that has failed, and writes a message for the summary if the task could not.
-fn report(folder: &StudyFolder, task: usize, status: ExitStatus, jobs: usize) {
+fn report(folder: &impl TaskFolder, task: usize, status: ExitStatus, jobs: usize) {
     if status.success() || status.code() == Some(i32::from(TrainError::Stopped(String::new()).exit_code())) {
         return;
     }

@@ -1,19 +1,19 @@
 //! Tasks as a job array of Slurm.
 //!
-//! `sbatch` gets one array for all tasks that are not finished, and a job after it (`afterany`) that gathers the
-//! tables. Two minutes before the wall time is over, Slurm sends SIGUSR1 to the batch script, which forwards it. The
+//! `sbatch` gets an array for the tasks of each stage that are not finished, each after the one before (`afterok`), and a
+//! job after all of them (`afterany`) that puts together what they have made. Two minutes before the wall time is over, Slurm sends SIGUSR1 to the batch script, which forwards it. The
 //! run writes a checkpoint and ends with exit code 75, and the script asks for its job to be queued again. A task that
 //! was killed by a signal is queued again as well, a few times.
 
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
-use light4gs_data::read_regular_text;
-use light4gs_lab::study::manifest::StudyFolder;
+use light4gs_data::{DataError, read_regular_text, write_atomically};
 use light4gs_train::error::TrainError;
 use serde::Deserialize;
 
 use super::super::output::say;
+use super::TaskFolder;
 
 const TASK_SCRIPT: &str = include_str!("task.sh");
 const GATHER_SCRIPT: &str = include_str!("gather.sh");
@@ -21,7 +21,7 @@ const GATHER_SCRIPT: &str = include_str!("gather.sh");
 /// The resources of jobs. Where one is not given, the cluster's default is used.
 #[derive(Clone, Debug, Deserialize)]
 #[serde(deny_unknown_fields, default)]
-pub(super) struct Settings {
+pub(in crate::cli) struct Settings {
     /// `--partition`
     partition: Option<String>,
     /// `--account`
@@ -63,7 +63,7 @@ impl Settings {
     ///
     /// # Errors
     /// [`TrainError::Input`] with the file and the key.
-    pub(super) fn load(path: &Path) -> Result<Self, TrainError> {
+    pub(in crate::cli) fn load(path: &Path) -> Result<Self, TrainError> {
         let shown = path.display();
         let text = read_regular_text(path, 1 << 20)
             .map_err(|error| TrainError::Input(format!("{shown}: cannot read the settings of Slurm: {error}")))?;
@@ -92,24 +92,32 @@ impl Settings {
     }
 }
 
-/// Submits tasks, at most `jobs` at a time if that is more than 1.
-pub(super) fn submit(folder: &StudyFolder, tasks: &[usize], jobs: u32, settings: &Settings) -> Result<(), TrainError> {
+/// Submits the tasks of each stage, at most `jobs` at a time if that is more than 1. A stage begins when all tasks of the one
+/// before have succeeded.
+pub(in crate::cli) fn submit<T: TaskFolder>(
+    folder: &T,
+    stages: &[Vec<usize>],
+    jobs: u32,
+    settings: &Settings,
+) -> Result<(), TrainError> {
     let program = std::env::current_exe().map_err(|error| TrainError::Input(format!("this program: {error}")))?;
     let root = std::path::absolute(folder.root()).map_err(|error| TrainError::Input(format!("--out: {error}")))?;
     let script = |name: &str, text: &str| -> Result<PathBuf, TrainError> {
-        folder.write(name, text.as_bytes())?;
-        Ok(root.join(name))
+        let path = root.join(".logs").join(name);
+        write_atomically(&path, |file| file.write_all(text.as_bytes()))?;
+        Ok(path)
     };
-    let (task_script, gather_script) =
-        (script(".logs/task.sh", TASK_SCRIPT)?, script(".logs/gather.sh", GATHER_SCRIPT)?);
     let logs = root.join(".logs");
-    let mut array = None;
-    if !tasks.is_empty() {
+    std::fs::create_dir_all(&logs).map_err(DataError::io("create", &logs))?;
+    let (task_script, gather_script) = (script("task.sh", TASK_SCRIPT)?, script("gather.sh", GATHER_SCRIPT)?);
+    let mut array: Option<String> = None;
+    for tasks in stages.iter().filter(|tasks| !tasks.is_empty()) {
         let mut command = Command::new("sbatch");
         command.args(settings.common()).args(settings.of_tasks());
+        command.args(array.map(|job| format!("--dependency=afterok:{job}")));
         command.arg(format!("--array={}{}", ranges(tasks), if jobs > 1 { format!("%{jobs}") } else { String::new() }));
-        command.arg("--job-name=light4gs-study").arg(format!("--output={}", logs.join("task-%a.log").display()));
-        command.arg(task_script).arg(&program).arg(&root).arg(settings.restarts.to_string());
+        command.arg("--job-name=light4gs").arg(format!("--output={}", logs.join("task-%a.log").display()));
+        command.arg(&task_script).arg(&program).arg(T::TASK).arg(&root).arg(settings.restarts.to_string());
         let job = sbatch(command)?;
         say(format_args!("{} tasks in job array {job}", tasks.len()))?;
         array = Some(job);
@@ -118,9 +126,13 @@ pub(super) fn submit(folder: &StudyFolder, tasks: &[usize], jobs: u32, settings:
     command.args(settings.common());
     command.args(array.map(|job| format!("--dependency=afterany:{job}")));
     command.arg("--job-name=light4gs-gather").arg(format!("--output={}", logs.join("gather.log").display()));
-    command.arg(gather_script).arg(&program).arg(&root);
+    command.arg(gather_script).arg(&program).arg(T::GATHER).arg(&root);
     let job = sbatch(command)?;
-    say(format_args!("job {job} gathers the tables; `light4gs gather {}` does so at any time", root.display()))
+    say(format_args!(
+        "job {job} puts the results together; `light4gs {} {}` does so at any time",
+        T::GATHER,
+        root.display()
+    ))
 }
 
 /// Numbers in Slurm's notation: `0-3,5`.

@@ -1,8 +1,8 @@
 #!/bin/bash
-# One task of a study as a job of an array: PROGRAM STUDY RESTARTS. Written by `light4gs study --launcher slurm`.
-program=$1 study=$2 restarts=$3
+# One task as a job of an array: PROGRAM COMMAND FOLDER RESTARTS. Written by `light4gs ... --launcher slurm`.
+program=$1 command=$2 folder=$3 restarts=$4
 
-"$program" study-task "$study" "$SLURM_ARRAY_TASK_ID" --quiet &
+"$program" "$command" "$folder" "$SLURM_ARRAY_TASK_ID" --quiet &
 task=$!
 # Slurm sends it to this script alone.
 trap 'kill -USR1 "$task" 2>/dev/null' USR1
@@ -26,9 +26,9 @@ elif [ "$code" -gt 128 ]; then
         echo "it is queued again" >&2
         scontrol requeue "$SLURM_JOB_ID"
     else
-        echo "killed by signal $((code - 128)), $restarts times queued again" >"$study/.logs/task-$SLURM_ARRAY_TASK_ID.failed"
+        echo "killed by signal $((code - 128)), $restarts times queued again" >"$folder/.logs/task-$SLURM_ARRAY_TASK_ID.failed"
     fi
-elif [ "$code" -ne 0 ] && [ ! -e "$study/.logs/task-$SLURM_ARRAY_TASK_ID.failed" ]; then
-    echo "exit code $code; see $study/.logs/task-$SLURM_ARRAY_TASK_ID.log" >"$study/.logs/task-$SLURM_ARRAY_TASK_ID.failed"
+elif [ "$code" -ne 0 ] && [ ! -e "$folder/.logs/task-$SLURM_ARRAY_TASK_ID.failed" ]; then
+    echo "exit code $code; see $folder/.logs/task-$SLURM_ARRAY_TASK_ID.log" >"$folder/.logs/task-$SLURM_ARRAY_TASK_ID.failed"
 fi
 exit "$code"

@@ -1,0 +1,211 @@
+//! The folder of a take in training: a run for the base, a run for each segment, and the file that they give.
+
+use std::path::{Path, PathBuf};
+
+use light4gs_codec::take::{NewSegment, TakeMeta, write_take};
+use light4gs_codec::{Limits, legal_name, read_stream};
+use light4gs_data::{DataError, Scene, read_regular_file, write_atomically};
+use light4gs_model::FieldKind;
+use serde::{Deserialize, Serialize};
+
+use super::base::HIDDEN;
+use super::plan::{PlannedSegment, TakePlan};
+use crate::config::{Config, MAX_CONFIG_BYTES};
+use crate::error::TrainError;
+use crate::run::RunFolder;
+use crate::sampling::SamplerKind;
+
+/// Names the take's dataset, and has its plan.
+const RECORD: &str = "take.json";
+const CONFIG: &str = "config.toml";
+/// Images of the base, about: enough to see every place several times, few enough to be read quickly.
+const BASE_IMAGES: usize = 300;
+const FEWEST_BASE_TIMES: usize = 24;
+
+/// `take.json`.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct TakeRecord {
+    /// Absolute path of the dataset.
+    pub scene: PathBuf,
+    /// Times from which the base is trained.
+    pub base_times: usize,
+    /// The segments.
+    pub plan: TakePlan,
+}
+
+/// The folder of a take.
+#[derive(Clone, Debug)]
+pub struct TakeFolder {
+    root: PathBuf,
+    record: TakeRecord,
+    config: Config,
+}
+
+impl TakeFolder {
+    /// Makes the folder of a take, or opens it where it holds the same one already.
+    ///
+    /// # Errors
+    /// [`TrainError::Input`] for a folder that holds something else; [`TrainError::Data`] for one that cannot be written.
+    pub fn create(root: &Path, scene: &Path, data: &Scene, plan: TakePlan, config: &Config) -> Result<Self, TrainError> {
+        let cameras = (data.train.len() / plan.frames.max(1)).max(1);
+        let record = TakeRecord {
+            scene: std::path::absolute(scene).map_err(DataError::io("find", scene))?,
+            base_times: (BASE_IMAGES / cameras).max(FEWEST_BASE_TIMES),
+            plan,
+        };
+        let folder = Self { root: root.to_owned(), record, config: config.clone() };
+        if root.join(RECORD).exists() {
+            let found = Self::open(root)?;
+            if found.record != folder.record || found.config != folder.config {
+                return Err(TrainError::Input(format!(
+                    "{} holds a take of another dataset, plan or configuration; name another folder, or remove that one",
+                    root.display()
+                )));
+            }
+            return Ok(found);
+        }
+        if root.read_dir().is_ok_and(|mut entries| entries.next().is_some()) {
+            return Err(TrainError::Input(format!("{} holds files but no take; name another folder", root.display())));
+        }
+        std::fs::create_dir_all(root).map_err(DataError::io("create", root))?;
+        write_atomically(&root.join(CONFIG), |file| file.write_all(config.to_toml().as_bytes()))?;
+        let text = serde_json::to_string_pretty(&folder.record).expect("plain data has a JSON form");
+        write_atomically(&root.join(RECORD), |file| writeln!(file, "{text}"))?;
+        Ok(folder)
+    }
+
+    /// Opens the folder of a take.
+    ///
+    /// # Errors
+    /// [`TrainError::Input`] if there is none, or if its record is damaged; [`TrainError::Config`] for its configuration.
+    pub fn open(root: &Path) -> Result<Self, TrainError> {
+        let path = root.join(RECORD);
+        let shown = root.display();
+        if !path.is_file() {
+            return Err(TrainError::Input(format!("{shown} is not the folder of a take: it has no {RECORD}")));
+        }
+        let bytes = read_regular_file(&path, MAX_CONFIG_BYTES).map_err(DataError::io("read", &path))?;
+        let record = serde_json::from_slice(&bytes).map_err(|error| {
+            TrainError::Input(format!("{} is damaged: {error}; begin the take in another folder", path.display()))
+        })?;
+        Ok(Self { root: root.to_owned(), record, config: Config::from_file(root.join(CONFIG))? })
+    }
+
+    /// Whether this is the folder of a take.
+    pub fn is_one(root: &Path) -> bool {
+        root.join(RECORD).is_file()
+    }
+
+    /// What the take is.
+    pub fn record(&self) -> &TakeRecord {
+        &self.record
+    }
+
+    /// The configuration that base and segments have in common.
+    pub fn config(&self) -> &Config {
+        &self.config
+    }
+
+    /// The folder itself.
+    pub fn root(&self) -> &Path {
+        &self.root
+    }
+
+    /// The run of the base.
+    pub fn base(&self) -> PathBuf {
+        self.root.join("base")
+    }
+
+    /// The run of a segment.
+    pub fn segment(&self, number: usize) -> PathBuf {
+        self.root.join("segments").join(format!("{number:04}"))
+    }
+
+    /// The file of the take.
+    pub fn file(&self) -> PathBuf {
+        self.root.join("take.l4gs")
+    }
+
+    /// The configuration of the base: nothing moves, and few times are used, in any order.
+    pub fn config_of_base(&self) -> Config {
+        let mut config = self.config.clone();
+        config.model.field = FieldKind::Still;
+        config.data.most_times = Some(self.record.base_times);
+        config.train.sampling = SamplerKind::Shuffled;
+        config.train.guided_sampling.iterations.clear();
+        config.train.losses.photometric.l2_until = 0;
+        config
+    }
+
+    /// The configuration of a segment.
+    pub fn config_of_segment(&self, segment: &PlannedSegment) -> Config {
+        let mut config = self.config.clone();
+        let base = self.base().join("scene.l4gs");
+        config.model.base = Some(std::path::absolute(&base).unwrap_or(base));
+        config.data.between = self.record.plan.between(segment);
+        config
+    }
+
+    /// The segments whose files are there, by number.
+    pub fn trained(&self) -> Vec<usize> {
+        (0..self.record.plan.segments.len()).filter(|number| self.is_trained(*number)).collect()
+    }
+
+    fn is_trained(&self, number: usize) -> bool {
+        // `bit_maps.json` is the last file that encoding writes.
+        let run = self.segment(number);
+        let coded = self.config.compression.profile.coded().is_some();
+        run.join("scene.l4gs").is_file() && (!coded || run.join("bit_maps.json").is_file())
+    }
+
+    /// Writes the file of the take from the segments that are trained. Returns its bytes.
+    ///
+    /// # Errors
+    /// [`TrainError::Input`] where the base is not trained yet; [`TrainError::Codec`] for a file of a run that is damaged.
+    pub fn join(&self) -> Result<u64, TrainError> {
+        let base_file = self.base().join("scene.l4gs");
+        if !base_file.is_file() {
+            return Err(TrainError::Input(format!(
+                "{} has no base yet, without which nothing can be shown; go on with the training first",
+                self.root.display()
+            )));
+        }
+        let limits = Limits::large();
+        let (base, info) = read_stream(&base_file, &limits)?;
+        let mut segments = Vec::new();
+        for number in self.trained() {
+            let run = self.segment(number);
+            let (stream, _) = read_stream(&run.join("scene.l4gs"), &limits)?;
+            let (folder, ..) = RunFolder::open(&run)?;
+            let hidden: Vec<u32> = folder.read_json(HIDDEN)?.unwrap_or_default();
+            let times = self.record.plan.times(&self.record.plan.segments[number]);
+            segments.push(NewSegment { times, hidden: bits(&hidden, info.gaussian_count as usize), stream });
+        }
+        let plan = &self.record.plan;
+        let name = self.record.scene.file_name().map(|name| name.to_string_lossy().into_owned()).unwrap_or_default();
+        let meta = TakeMeta {
+            name: legal_name(&name),
+            fps: (1.0 / plan.interval()) as f32,
+            seconds: plan.seconds,
+            ..TakeMeta::default()
+        };
+        let spare = plan.segments.len() - segments.len();
+        let bytes = write_take(&meta, &base, &segments, spare as u32)?;
+        write_atomically(&self.file(), |file| file.write_all(&bytes))?;
+        Ok(bytes.len() as u64)
+    }
+}
+
+/// A bit for each Gaussian of the base, set where it is hidden; empty where none is.
+fn bits(hidden: &[u32], count: usize) -> Vec<bool> {
+    if hidden.is_empty() {
+        return Vec::new();
+    }
+    let mut bits = vec![false; count];
+    for &index in hidden {
+        if let Some(bit) = bits.get_mut(index as usize) {
+            *bit = true;
+        }
+    }
+    bits
+}

@@ -1,0 +1,129 @@
+//! The segments of a take: which frames each of them shows and is trained on.
+
+use light4gs_codec::take::SegmentTimes;
+use light4gs_data::Scene;
+use serde::{Deserialize, Serialize};
+
+use crate::error::TrainError;
+
+/// Frames on each side of a segment on which it is trained as well, so that no join is at the end of a motion.
+const MARGIN: usize = 4;
+/// A segment of fewer frames has no motion to learn.
+const FEWEST: usize = 4;
+
+/// A segment of a plan.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct PlannedSegment {
+    /// The first frame that it shows, counted from 0.
+    pub first: usize,
+    /// The number of frames that it shows.
+    pub frames: usize,
+    /// The first frame that it is trained on.
+    pub trained_first: usize,
+    /// The number of frames that it is trained on.
+    pub trained_frames: usize,
+}
+
+/// How a take is divided.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct TakePlan {
+    /// Frames of the take: times that images have.
+    pub frames: usize,
+    /// Seconds from the first frame to the last.
+    pub seconds: f64,
+    /// In the order of their times.
+    pub segments: Vec<PlannedSegment>,
+}
+
+impl TakePlan {
+    /// Segments of about this number of seconds each, of equal length to within a frame.
+    ///
+    /// # Errors
+    /// [`TrainError::Input`] where a segment would have fewer than four frames, or the take has fewer.
+    pub fn of(data: &Scene, seconds: f64, segment: f64) -> Result<Self, TrainError> {
+        let mut times: Vec<u32> = data.train.iter().chain(&data.test).map(|frame| frame.time.to_bits()).collect();
+        times.sort_unstable();
+        times.dedup();
+        Self::new(times.len(), seconds, segment)
+    }
+
+    fn new(frames: usize, seconds: f64, segment: f64) -> Result<Self, TrainError> {
+        let count = ((seconds / segment).round() as usize).max(1);
+        if frames < FEWEST * count {
+            return Err(TrainError::Input(format!(
+                "--segment {segment}: the take has {frames} frames in {seconds:.2} seconds, so a segment would have fewer than \
+                 {FEWEST}; give at least {:.2}",
+                FEWEST as f64 * seconds / frames.max(1) as f64
+            )));
+        }
+        let begin = |number: usize| number * frames / count;
+        let segments = (0..count).map(|number| {
+            let (first, end) = (begin(number), begin(number + 1));
+            let trained_first = first.saturating_sub(MARGIN);
+            let trained_end = (end + MARGIN).min(frames);
+            PlannedSegment {
+                first,
+                frames: end - first,
+                trained_first,
+                trained_frames: trained_end - trained_first,
+            }
+        });
+        Ok(Self { frames, seconds, segments: segments.collect() })
+    }
+
+    /// Seconds from one frame to the next.
+    pub fn interval(&self) -> f64 {
+        self.seconds / (self.frames.max(2) - 1) as f64
+    }
+
+    /// The frames that a segment is trained on, as shares of the take's time (`data.between`).
+    pub fn between(&self, segment: &PlannedSegment) -> [f64; 2] {
+        let last = (self.frames.max(2) - 1) as f64;
+        let end = segment.trained_first + segment.trained_frames - 1;
+        [segment.trained_first as f64 / last, end as f64 / last]
+    }
+
+    /// The times of a segment in a file. The last one also shows the last frame's moment.
+    pub fn times(&self, segment: &PlannedSegment) -> SegmentTimes {
+        let at = |frame: usize| frame as f64 * self.interval();
+        SegmentTimes {
+            begin: at(segment.first),
+            end: at(segment.first + segment.frames),
+            stream_begin: at(segment.trained_first),
+            stream_end: at(segment.trained_first + segment.trained_frames - 1),
+            frames: segment.frames as u32,
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn segments_show_every_frame_once_and_are_trained_beyond_their_joins() {
+        let plan = TakePlan::new(1800, 60.0, 2.0).unwrap();
+        assert_eq!(plan.segments.len(), 30);
+        let mut next = 0;
+        for segment in &plan.segments {
+            assert_eq!(segment.first, next);
+            next += segment.frames;
+            assert!((59..=61).contains(&segment.frames));
+            assert!(segment.trained_first <= segment.first && segment.trained_frames >= segment.frames + MARGIN);
+            let [from, to] = plan.between(segment);
+            assert!((0.0..to).contains(&from) && to <= 1.0);
+        }
+        assert_eq!(next, 1800);
+        let first = plan.times(&plan.segments[0]);
+        let second = plan.times(&plan.segments[1]);
+        assert_eq!(first.end, second.begin);
+        assert!(second.stream_begin < second.begin && second.end < second.stream_end);
+    }
+
+    #[test]
+    fn short_takes_have_one_segment_and_too_short_segments_are_refused() {
+        assert_eq!(TakePlan::new(30, 1.0, 2.0).unwrap().segments.len(), 1);
+        let refused = TakePlan::new(60, 2.0, 0.1).unwrap_err().to_string();
+        assert!(refused.contains("--segment 0.1") && refused.contains("0.13"), "{refused}");
+    }
+}
