@@ -16,6 +16,21 @@ pub enum CodecError {
         /// The first bytes, at most eight.
         found: Vec<u8>,
     },
+    /// The bytes are those of a take, which is a file of several streams.
+    #[error(
+        "it is a take, a file of several streams, expected a .l4gs stream of one clip; open it with `light4gs_codec::take::Take`, \
+         or with `PlayableTake` of light4gs-render"
+    )]
+    IsTake,
+    /// The bytes do not begin like a take.
+    #[error(
+        "not a take: it begins with {found:02x?}, expected 89 4c 34 47 54 0d 0a 1a; \
+         a .l4gs stream of one clip (89 4c 34 47 53 0d 0a 1a) is opened with `decode`, `read_file` or `PlayableScene`"
+    )]
+    NotTake {
+        /// The first bytes, at most eight.
+        found: Vec<u8>,
+    },
     /// The stream was written by a newer version of this crate.
     #[error("the stream has version {found}, this program reads versions up to {VERSION}; use a newer program")]
     NewerVersion {
@@ -164,6 +179,14 @@ pub enum CodecError {
         /// What is wrong with it.
         error: Box<CodecError>,
     },
+    /// A stream of a take is wrong; the error inside says how.
+    #[error("{part} of the take: {error}")]
+    InTake {
+        /// Which of its streams: `base`, or `segment` and its number in time, from 0.
+        part: String,
+        /// What is wrong with it.
+        error: Box<CodecError>,
+    },
     /// The operating system refused.
     #[error("cannot {action} {}: {error}", path.display())]
     Io {
@@ -183,7 +206,7 @@ impl CodecError {
     }
 
     /// What is wrong, in one word that stays the same: the name of the variant in lower case, such as `over-limit`. For an error
-    /// in a file it is that of the error inside.
+    /// in a file or a take it is that of the error inside.
     ///
     /// ```
     /// let error = light4gs_codec::decode(b"PK").unwrap_err();
@@ -192,6 +215,8 @@ impl CodecError {
     pub fn kind(&self) -> &'static str {
         match self {
             Self::NotL4gs { .. } => "not-l4gs",
+            Self::IsTake => "is-take",
+            Self::NotTake { .. } => "not-take",
             Self::NewerVersion { .. } => "newer-version",
             Self::Truncated { .. } => "truncated",
             Self::TrailingBytes { .. } => "trailing-bytes",
@@ -206,7 +231,7 @@ impl CodecError {
             Self::NonFinite { .. } => "non-finite",
             Self::Invalid { .. } => "invalid",
             Self::SelfCheck { .. } => "self-check",
-            Self::InFile { error, .. } => error.kind(),
+            Self::InFile { error, .. } | Self::InTake { error, .. } => error.kind(),
             Self::Io { .. } => "io",
         }
     }

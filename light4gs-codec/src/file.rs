@@ -1,8 +1,9 @@
 //! Streams in files.
 
 use std::{
-    fs::{self, File, Metadata},
+    fs::{self, File, Metadata, OpenOptions},
     io::{self, Read, Seek, SeekFrom},
+    ops::Range,
     path::Path,
 };
 
@@ -47,8 +48,7 @@ pub fn read_info(path: &Path) -> Result<StreamInfo, CodecError> {
 /// # Errors
 /// As [`read_info`].
 pub fn read_info_with_limits(path: &Path, limits: &Limits) -> Result<StreamInfo, CodecError> {
-    let file = OpenFile::open(path, limits)?;
-    file.info().map_err(|error| file.name(error))
+    in_whole_file(path, limits, |stream| stream.info())
 }
 
 /// Reads a file that is a stream, and passes its bytes to `parse`. Nothing beyond its header and the heads of its sections is
@@ -62,8 +62,7 @@ pub fn read_file_and<T>(
     limits: &Limits,
     parse: impl FnOnce(&[u8]) -> Result<T, CodecError>,
 ) -> Result<T, CodecError> {
-    let file = OpenFile::open(path, limits)?;
-    file.bytes().and_then(|bytes| parse(&bytes)).map_err(|error| file.name(error))
+    in_whole_file(path, limits, |stream| parse(&stream.bytes()?))
 }
 
 /// The bytes of a file that is a stream, and what it holds: for programs that pass a file on.
@@ -71,57 +70,81 @@ pub fn read_file_and<T>(
 /// # Errors
 /// As [`read_info`].
 pub fn read_stream(path: &Path, limits: &Limits) -> Result<(Vec<u8>, StreamInfo), CodecError> {
-    let file = OpenFile::open(path, limits)?;
-    let bytes = file.bytes().map_err(|error| file.name(error))?;
-    let info = info_with_limits(&bytes, limits).map_err(|error| file.name(error))?;
-    Ok((bytes, info))
+    in_whole_file(path, limits, |stream| {
+        let bytes = stream.bytes()?;
+        let info = info_with_limits(&bytes, limits)?;
+        Ok((bytes, info))
+    })
 }
 
-/// A file whose header has been checked, and the length of each section with its head.
+/// Reads the stream that a whole file is.
+fn in_whole_file<T>(
+    path: &Path,
+    limits: &Limits,
+    read: impl FnOnce(&StreamInFile<'_>) -> Result<T, CodecError>,
+) -> Result<T, CodecError> {
+    let (file, length) = open_regular(path, File::options().read(true))?;
+    StreamInFile::open(path, &file, 0..length, limits)
+        .and_then(|stream| read(&stream))
+        .map_err(|error| name(path, error))
+}
+
+/// The bytes of a stream in a range of a file, which are read as [`read_file_and`] reads them.
+pub(crate) fn read_stream_in(
+    path: &Path,
+    file: &File,
+    range: Range<u64>,
+    limits: &Limits,
+) -> Result<Vec<u8>, CodecError> {
+    StreamInFile::open(path, file, range, limits)?.bytes()
+}
+
+/// A file, which is no pipe and no device, and its length.
+pub(crate) fn open_regular(path: &Path, options: &OpenOptions) -> Result<(File, u64), CodecError> {
+    let io = |error| CodecError::Io { action: "read", path: path.to_owned(), error };
+    // Checked before the file is opened: opening a pipe would wait for its writer. Once more afterwards: it may be another
+    // file by then.
+    fs::metadata(path).and_then(|found| only_regular(&found)).map_err(io)?;
+    let file = options.open(path).map_err(io)?;
+    let found = file.metadata().map_err(io)?;
+    only_regular(&found).map_err(io)?;
+    Ok((file, found.len()))
+}
+
+/// A stream in a file whose header has been checked, and the length of each section with its head.
 #[derive(Debug)]
-struct OpenFile<'a> {
+struct StreamInFile<'a> {
     path: &'a Path,
-    file: File,
+    file: &'a File,
+    /// Where the stream begins in the file.
+    begin: u64,
     limits: Limits,
     header: Header,
 }
 
-impl<'a> OpenFile<'a> {
-    fn open(path: &'a Path, limits: &Limits) -> Result<Self, CodecError> {
-        let io = |error| CodecError::Io { action: "read", path: path.to_owned(), error };
-        // Checked before the file is opened: opening a pipe would wait for its writer. Once more afterwards: it may be another
-        // file by then.
-        fs::metadata(path).and_then(|found| only_regular(&found)).map_err(io)?;
-        let file = File::open(path).map_err(io)?;
-        let found = file.metadata().map_err(io)?;
-        only_regular(&found).map_err(io)?;
-        let read = || {
-            let prelude = Prelude::read(&read_at(&file, path, 0, PRELUDE as u64)?, limits)?;
-            prelude.check_length(found.len())?;
-            let header = Header::read(&read_at(&file, path, 0, prelude.header_bytes())?, prelude, limits)?;
-            for entry in &header.entries {
-                entry.check_length(&read_at(&file, path, entry.offset, entry.head_bytes())?, limits)?;
-            }
-            Ok(header)
-        };
-        let header = read().map_err(|error| name(path, error))?;
-        Ok(Self { path, file, limits: *limits, header })
+impl<'a> StreamInFile<'a> {
+    fn open(path: &'a Path, file: &'a File, range: Range<u64>, limits: &Limits) -> Result<Self, CodecError> {
+        let Range { start: begin, end } = range;
+        let length = end.saturating_sub(begin);
+        let read =
+            |offset: u64, count: u64| read_at(file, path, begin + offset, count.min(length.saturating_sub(offset)));
+        let prelude = Prelude::read(&read(0, PRELUDE as u64)?, limits)?;
+        prelude.check_length(length)?;
+        let header = Header::read(&read(0, prelude.header_bytes())?, prelude, limits)?;
+        for entry in &header.entries {
+            entry.check_length(&read(entry.offset, entry.head_bytes())?, limits)?;
+        }
+        Ok(Self { path, file, begin, limits: *limits, header })
     }
 
-    /// An error of this file.
-    fn name(&self, error: CodecError) -> CodecError {
-        name(self.path, error)
+    /// Some bytes of the stream; fewer at the end of the file.
+    fn read(&self, offset: u64, count: u64) -> Result<Vec<u8>, CodecError> {
+        read_at(self.file, self.path, self.begin + offset, count)
     }
 
     /// All bytes.
     fn bytes(&self) -> Result<Vec<u8>, CodecError> {
-        let mut bytes = Vec::new();
-        let length = self.header.prelude.file_bytes;
-        let io = |error| CodecError::Io { action: "read", path: self.path.to_owned(), error };
-        let size = usize::try_from(length).map_err(|_| io(io::ErrorKind::OutOfMemory.into()))?;
-        bytes.try_reserve_exact(size).map_err(|_| io(io::ErrorKind::OutOfMemory.into()))?;
-        from(&self.file, 0).and_then(|file| file.take(length).read_to_end(&mut bytes)).map_err(io)?;
-        Ok(bytes)
+        read_all(self.file, self.path, self.begin, self.header.prelude.file_bytes)
     }
 
     /// What the beginnings of the sections say. The checksums of all bytes are checked.
@@ -130,7 +153,7 @@ impl<'a> OpenFile<'a> {
         let (mut beginnings, mut header) = (Vec::new(), self.header.clone());
         for entry in &mut header.entries {
             self.check_checksum(entry)?;
-            let beginning = read_at(&self.file, self.path, entry.offset, entry.head_bytes())?;
+            let beginning = self.read(entry.offset, entry.head_bytes())?;
             (entry.offset, entry.bytes) = (beginnings.len() as u64, beginning.len() as u64);
             beginnings.extend(beginning);
         }
@@ -141,14 +164,14 @@ impl<'a> OpenFile<'a> {
     fn check_checksum(&self, entry: &Entry) -> Result<(), CodecError> {
         let mut sum = 0;
         for offset in (entry.offset..entry.end()).step_by(PIECE as usize) {
-            sum = crc32c::crc32c_append(sum, &read_at(&self.file, self.path, offset, PIECE.min(entry.end() - offset))?);
+            sum = crc32c::crc32c_append(sum, &self.read(offset, PIECE.min(entry.end() - offset))?);
         }
         entry.check(sum)
     }
 }
 
 /// Puts the name of a file before what is wrong in it.
-fn name(path: &Path, error: CodecError) -> CodecError {
+pub(crate) fn name(path: &Path, error: CodecError) -> CodecError {
     match error {
         io @ CodecError::Io { .. } => io,
         other => CodecError::InFile { path: path.to_owned(), error: Box::new(other) },
@@ -171,8 +194,18 @@ fn from(mut file: &File, offset: u64) -> io::Result<&File> {
     Ok(file)
 }
 
+/// A given number of bytes of a file; fewer at its end. Their room is taken at once, or not at all.
+fn read_all(file: &File, path: &Path, offset: u64, count: u64) -> Result<Vec<u8>, CodecError> {
+    let mut bytes = Vec::new();
+    let io = |error| CodecError::Io { action: "read", path: path.to_owned(), error };
+    let size = usize::try_from(count).map_err(|_| io(io::ErrorKind::OutOfMemory.into()))?;
+    bytes.try_reserve_exact(size).map_err(|_| io(io::ErrorKind::OutOfMemory.into()))?;
+    from(file, offset).and_then(|file| file.take(count).read_to_end(&mut bytes)).map_err(io)?;
+    Ok(bytes)
+}
+
 /// Some bytes of a file; fewer at its end.
-fn read_at(file: &File, path: &Path, offset: u64, count: u64) -> Result<Vec<u8>, CodecError> {
+pub(crate) fn read_at(file: &File, path: &Path, offset: u64, count: u64) -> Result<Vec<u8>, CodecError> {
     let mut bytes = Vec::new();
     let read = from(file, offset).and_then(|file| file.take(count).read_to_end(&mut bytes));
     read.map_err(|error| CodecError::Io { action: "read", path: path.to_owned(), error })?;

@@ -15,6 +15,7 @@
 //! | know beforehand whether the encoder accepts a scene | [`checks`] |
 //! | have the Gaussians at many times | [`MotionEvaluator`]; for images see the crate `light4gs-render` |
 //! | show a file while it comes | [`StreamDecoder`] |
+//! | read or write minutes in one file, a take | [`take`] |
 //! | read one section, or one layer of Gaussians | [`OpenStream`] |
 //! | accept files of strangers | nothing: the default [`Limits`] are for these. [`Limits::large`] is for your own |
 //! | describe a network to the codec | [`network`] |
@@ -105,6 +106,7 @@ mod scene;
 mod sh;
 mod steps;
 mod stream;
+pub mod take;
 mod vectors;
 
 pub use budget::Demand;
@@ -116,7 +118,7 @@ pub use entropy::{Distributions, FrequencyTable};
 pub use error::CodecError;
 #[cfg(not(target_os = "unknown"))]
 pub use file::{read_file, read_file_and, read_file_with_limits, read_info, read_info_with_limits, read_stream};
-pub use format::{MAGIC, VERSION};
+pub use format::{MAGIC, TAKE_MAGIC, VERSION};
 pub use limits::Limits;
 pub use motion::MotionEvaluator;
 pub use network::{Network, weights as network_weights};

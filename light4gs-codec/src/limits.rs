@@ -19,7 +19,7 @@ use crate::{CodecError, plane_layout::PlaneAxes};
 /// ```
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Limits {
-    /// Bytes of a whole stream. A section has at most the bytes that the counts in its head can take.
+    /// Bytes of a whole stream; a take may be longer, each stream in it may not. A section has at most the bytes that the counts in its head can take.
     pub file_bytes: u64,
     /// Bytes of the scene meta in the header.
     pub meta_bytes: u32,
@@ -37,6 +37,8 @@ pub struct Limits {
     pub image_side: u32,
     /// Width times height of the source's camera.
     pub image_pixels: u64,
+    /// Segments of a take, together with the slots for further ones.
+    pub segments: u32,
     /// Gaussians.
     pub gaussians: u32,
     /// Attributes of a Gaussian.
@@ -77,6 +79,7 @@ impl Default for Limits {
             frames: 100_000,
             image_side: 1 << 14,
             image_pixels: 1 << 25,
+            segments: 100_000,
             gaussians: 1 << 26,
             attributes: 64,
             attribute_width: 1 << 8,

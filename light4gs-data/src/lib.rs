@@ -10,7 +10,9 @@
 //! | open a dataset of a known layout | [`Scene::open`] with [`LoadOptions`] |
 //! | read a layout of your own | a [`DatasetLayout`], added to [`Layouts`] |
 //! | make a dataset from videos | [`prepare`], which runs `ffmpeg` and `colmap` |
+//! | take a window of a long capture | [`Scene::between`], [`Scene::thinned`] |
 //! | try things out without a dataset | [`write_synthetic`]: a small moving scene |
+//! | the same for a minute and longer | [`write_take`]: a room in which things come and go |
 //! | decode images within a memory bound | [`ImageStore`] |
 //! | take metrics over parts of an image | [`regions`] |
 //! | see what a dataset is taken for | [`CaptureSummary`] |
@@ -50,7 +52,7 @@
 //! # Conventions
 //!
 //! - Cameras are OpenCV pinholes: +x right, +y down, +z forward. Focal lengths and principal points are in pixels.
-//! - Time is in `[0, 1]`.
+//! - Time is in `[0, 1]`; [`Scene::seconds`] says how long that is, where it is known.
 //! - Images are `[H, W, 3]`, row-major, already composited on the background, in the byte values of the file (no gamma
 //!   handling).
 //!
@@ -64,6 +66,7 @@ mod atomic;
 mod camera;
 mod curves;
 mod digest;
+mod duration;
 mod error;
 mod exchange;
 mod faults;
@@ -85,6 +88,7 @@ mod scene;
 mod summary;
 mod synchrony;
 mod synthetic;
+mod window;
 
 pub use atomic::{is_temporary_name, process_id, sweep_leftovers, write_atomically};
 pub use camera::{Camera, Intrinsics, PoseError};
@@ -112,4 +116,4 @@ pub use regular_file::{open_regular_file, read_regular_file, read_regular_text};
 pub use scene::{Reading, Scene, Split, SplitFrames};
 pub use summary::{CaptureFact, CaptureSummary};
 pub use synchrony::{OutOfStep, out_of_step};
-pub use synthetic::{SyntheticOptions, write_synthetic};
+pub use synthetic::{SyntheticOptions, TakeOptions, write_synthetic, write_take};

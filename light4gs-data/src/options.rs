@@ -74,6 +74,9 @@ pub struct LoadOptions {
     /// Length of the sequence in frames: later ones are left out. Where the dataset counts frames instead of giving
     /// times (layout `neu3d`, whose captures have 300), the time of frame `i` is `i / frames`. `None`: all frames.
     pub frames: Option<usize>,
+    /// Frames a second at which the capture was taken, 0.001 to 100000: its different times are counted as frames, whatever its files
+    /// say. `None`: as the files say, see [`crate::Scene::seconds`].
+    pub frames_a_second: Option<f64>,
     /// The color behind transparent pixels: red, green, blue in `[0, 1]`.
     pub background: [f32; 3],
     /// Seed of the random point cloud.
@@ -100,6 +103,7 @@ impl Default for LoadOptions {
             layout: None,
             resolution: Resolution::Native,
             frames: None,
+            frames_a_second: None,
             background: [1.0; 3],
             seed: 0,
             random_points: 2000,
@@ -131,6 +135,9 @@ impl LoadOptions {
         }
         if self.frames == Some(0) {
             return bad("frames", "0, expected at least 1".into());
+        }
+        if let Some(found) = self.frames_a_second.filter(|rate| !(1e-3..=1e5).contains(rate)) {
+            return bad("frames_a_second", format!("{found}, expected 0.001 to 100000"));
         }
         if self.most_points == 0 {
             return bad("most_points", "0, expected at least 1".into());
@@ -168,6 +175,8 @@ mod tests {
             ("background", LoadOptions { background: [0.0, f32::NAN, 0.0], ..Default::default() }),
             ("resolution", LoadOptions { resolution: Resolution::MaxSide(0), ..Default::default() }),
             ("frames", LoadOptions { frames: Some(0), ..Default::default() }),
+            ("frames_a_second", LoadOptions { frames_a_second: Some(0.0), ..Default::default() }),
+            ("frames_a_second", LoadOptions { frames_a_second: Some(f64::NAN), ..Default::default() }),
             ("random_points", LoadOptions { random_points: 0, ..Default::default() }),
             ("random_half_size", LoadOptions { random_half_size: -1.0, ..Default::default() }),
         ];

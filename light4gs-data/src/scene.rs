@@ -80,7 +80,7 @@ pub struct Scene {
     pub layout: &'static str,
     /// Frames to learn from; at least one.
     pub train: Vec<Frame>,
-    /// Frames to measure quality on; at least one.
+    /// Frames to measure quality on; at least one, but for a window of a scene ([`Scene::between`]).
     pub test: Vec<Frame>,
     /// More frames to measure quality on; may be empty.
     pub val: Vec<Frame>,
@@ -95,6 +95,8 @@ pub struct Scene {
     /// 1.1 times the largest distance of a training camera's center from their mean, world units
     /// (1 if they all coincide, since learning rates are multiplied by it).
     pub extent: f32,
+    /// Seconds from time 0 to time 1, where the capture or [`LoadOptions::frames_a_second`](crate::LoadOptions) says so.
+    pub seconds: Option<f64>,
     /// Notes for the user about reading the folder, such as images without a pose, or frames that were left out.
     pub notes: Vec<String>,
     /// How cameras and times were read.
@@ -165,6 +167,7 @@ impl Scene {
             points,
             camera_mean,
             extent,
+            seconds: None,
             notes: Vec::new(),
             reading: Reading::default(),
         })
@@ -181,6 +184,13 @@ impl Scene {
     #[must_use]
     pub fn with_reading(mut self, reading: Reading) -> Self {
         self.reading = reading;
+        self
+    }
+
+    /// The same scene, with the seconds from its time 0 to its time 1.
+    #[must_use]
+    pub fn with_seconds(mut self, seconds: Option<f64>) -> Self {
+        self.seconds = seconds;
         self
     }
 

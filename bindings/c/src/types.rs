@@ -64,6 +64,8 @@ impl From<Limits> for L4gsLimits {
             frames,
             image_side,
             image_pixels,
+            // Of takes, which C does not open.
+            segments: _,
             gaussians,
             attributes,
             attribute_width,
@@ -116,6 +118,7 @@ impl From<L4gsLimits> for Limits {
             frames: narrow(limits.frames),
             image_side: narrow(limits.image_side),
             image_pixels: limits.image_pixels,
+            segments: Self::default().segments,
             gaussians: narrow(limits.gaussians),
             attributes: narrow(limits.attributes),
             attribute_width: narrow(limits.attribute_width),

@@ -45,8 +45,8 @@ macro_rules! limits {
 }
 
 limits! {
-    file_bytes meta_bytes sections string_bytes name_bytes extras frames image_side image_pixels gaussians attributes
-    attribute_width channels resolution scales networks nodes layer_width layer_weights memory_bytes nanoseconds
+    file_bytes meta_bytes sections string_bytes name_bytes extras frames image_side image_pixels segments gaussians
+    attributes attribute_width channels resolution scales networks nodes layer_width layer_weights memory_bytes nanoseconds
 }
 
 /// An error of the decoder as an exception: `OSError` if the system refused, otherwise `light4gs.Error`.

@@ -26,6 +26,7 @@ const LIMITS: Limits = Limits {
     frames: 1 << 10,
     image_side: 1 << 12,
     image_pixels: 1 << 22,
+    segments: 1 << 8,
     gaussians: 1 << 12,
     attributes: 8,
     attribute_width: 16,

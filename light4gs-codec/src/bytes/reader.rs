@@ -96,6 +96,10 @@ impl<'a> Reader<'a> {
         self.array(field).map(f32::from_le_bytes)
     }
 
+    pub(crate) fn f64(&mut self, field: &str) -> Result<f64, CodecError> {
+        self.array(field).map(f64::from_le_bytes)
+    }
+
     /// `count` numbers.
     pub(crate) fn f32s(&mut self, field: &str, count: u64) -> Result<Vec<f32>, CodecError> {
         let taken = self.take(field, count.saturating_mul(4))?;

@@ -42,6 +42,10 @@ impl Writer {
         self.bytes.extend_from_slice(&value.to_le_bytes());
     }
 
+    pub(crate) fn f64(&mut self, value: f64) {
+        self.bytes.extend_from_slice(&value.to_le_bytes());
+    }
+
     pub(crate) fn f32s(&mut self, values: &[f32]) {
         self.bytes.reserve(4 * values.len());
         self.bytes.extend(values.iter().flat_map(|value| value.to_le_bytes()));

@@ -12,7 +12,7 @@ use crate::{
         Reader, Writer,
         sections::{Encoding, Kind, Section},
     },
-    format::{MAGIC, VERSION},
+    format::{MAGIC, TAKE_MAGIC, VERSION},
     limits::at_most,
 };
 
@@ -50,6 +50,9 @@ impl Prelude {
     /// Reads the first [`PRELUDE`] bytes of `bytes`.
     pub(crate) fn read(bytes: &[u8], limits: &Limits) -> Result<Self, CodecError> {
         let start = &bytes[..bytes.len().min(MAGIC.len())];
+        if start == TAKE_MAGIC {
+            return Err(CodecError::IsTake);
+        }
         if !MAGIC.starts_with(start) {
             return Err(CodecError::NotL4gs { found: start.to_vec() });
         }

@@ -17,12 +17,7 @@ const SECTION: &str = "meta";
 /// Refuses metadata that cannot be written or makes no sense.
 pub(crate) fn check(meta: &SceneMeta, limits: &Limits) -> Result<(), CodecError> {
     check_name(SECTION, "name", &meta.name, limits)?;
-    at_most(SECTION, "number of extra entries", meta.extra.len() as u64, limits.extras)?;
-    for (key, value) in &meta.extra {
-        check_name(SECTION, "extra key", key, limits)?;
-        at_most(SECTION, format!("length of extra.{key}"), value.len() as u64, limits.string_bytes)?;
-        check_text(SECTION, &format!("extra.{key}"), value, |c| c != '\n' && c != '\t')?;
-    }
+    check_extra(&meta.extra, limits)?;
     at_most(SECTION, "frame_count", meta.frame_count.into(), limits.frames)?;
     limits.check_image(meta.width, meta.height)?;
     fields::check_finite_meta(meta)?;
@@ -44,6 +39,17 @@ pub(crate) fn check(meta: &SceneMeta, limits: &Limits) -> Result<(), CodecError>
     Ok(())
 }
 
+/// Refuses extra entries that cannot be written.
+pub(crate) fn check_extra(extra: &BTreeMap<String, String>, limits: &Limits) -> Result<(), CodecError> {
+    at_most(SECTION, "number of extra entries", extra.len() as u64, limits.extras)?;
+    for (key, value) in extra {
+        check_name(SECTION, "extra key", key, limits)?;
+        at_most(SECTION, format!("length of extra.{key}"), value.len() as u64, limits.string_bytes)?;
+        check_text(SECTION, &format!("extra.{key}"), value, |c| c != '\n' && c != '\t')?;
+    }
+    Ok(())
+}
+
 pub(crate) fn write(meta: &SceneMeta, writer: &mut Writer) {
     writer.string(&meta.name);
     writer.u32(meta.frame_count);
@@ -54,8 +60,13 @@ pub(crate) fn write(meta: &SceneMeta, writer: &mut Writer) {
     writer.u32(meta.width);
     writer.u32(meta.height);
     writer.f32(meta.fov_x);
-    writer.u32(meta.extra.len() as u32);
-    for (key, value) in &meta.extra {
+    write_extra(&meta.extra, writer);
+}
+
+/// Their number, then each key and its value.
+pub(crate) fn write_extra(extra: &BTreeMap<String, String>, writer: &mut Writer) {
+    writer.u32(extra.len() as u32);
+    for (key, value) in extra {
         writer.string(key);
         writer.string(value);
     }
@@ -80,7 +91,7 @@ pub(crate) fn read(bytes: &[u8], limits: &Limits) -> Result<SceneMeta, CodecErro
 }
 
 /// Keys are strictly ascending, so that each meta has only one encoding.
-fn read_extra(reader: &mut Reader<'_>, limits: &Limits) -> Result<BTreeMap<String, String>, CodecError> {
+pub(crate) fn read_extra(reader: &mut Reader<'_>, limits: &Limits) -> Result<BTreeMap<String, String>, CodecError> {
     let count = reader.u32("number of extra entries")?;
     at_most(SECTION, "number of extra entries", count.into(), limits.extras)?;
     let mut extra = BTreeMap::new();

@@ -18,7 +18,7 @@ mod incremental;
 mod info;
 mod input;
 mod layers;
-mod meta;
+pub(crate) mod meta;
 mod open;
 mod parts;
 mod promise;

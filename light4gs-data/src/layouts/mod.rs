@@ -20,6 +20,7 @@ pub use nerfies::{HyperNerf, NerfDs};
 pub use nerfstudio::Nerfstudio;
 pub use neu3d::Neu3d;
 
+use crate::duration::seconds_at_rate;
 use crate::error::DataError;
 use crate::options::LoadOptions;
 use crate::scene::Scene;
@@ -127,6 +128,10 @@ impl Scene {
             None => layouts.detect(root)?,
         };
         let mut scene = layout.open(root, options)?.with_usable_points(options.most_points);
+        if let Some(rate) = options.frames_a_second {
+            // Before times are moved: cameras that are out of step would count as further frames.
+            scene.seconds = seconds_at_rate(&scene.times(), rate);
+        }
         if options.synchronize {
             scene.put_in_step(options)?;
         }

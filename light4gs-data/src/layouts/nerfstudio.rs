@@ -2,11 +2,13 @@
 //!
 //! The fields of a frame are those of [`Transforms`].
 //! `time` of a frame is optional; without it the time comes from the images' names, see [`sequence`]. `train_filenames`,
-//! `val_filenames` and `test_filenames` are the splits, if they are there. `light4gs prepare` writes this layout, too.
+//! `val_filenames` and `test_filenames` are the splits, if they are there. `fps` or `seconds` say how long the capture lasts, see
+//! [`seconds_of`]. `light4gs prepare` writes this layout, too.
 
 use super::colmap::{frame_name, split};
 use super::layout::DatasetLayout;
 use super::shared::posed::{self, PosedImage};
+use super::shared::seconds::seconds_of;
 use super::shared::sequence::{Place, Sequence, held_out, sequence};
 use super::shared::times::TimeRange;
 use super::shared::transforms::{REMEDY, Transforms};
@@ -48,7 +50,13 @@ impl DatasetLayout for Nerfstudio {
             .iter()
             .map(|(_, path)| path.strip_prefix(root).unwrap_or(path).to_string_lossy().into_owned())
             .collect();
-        let Sequence { places, mut reading } = places_of(&file, &present, sequence(&relative, options))?;
+        let mut found = sequence(&relative, options);
+        let times = given_times(&file, &present)?;
+        let seconds = seconds_of(&file.path, &file.document, times.as_deref(), &found, &mut notes);
+        if let Some(times) = times {
+            take_times(&mut found, &file, times)?;
+        }
+        let Sequence { places, mut reading, .. } = found;
         let mut images = Vec::with_capacity(present.len());
         for ((((i, _), path), place), name) in present.iter().zip(&places).zip(frame_names(&relative)) {
             images.push(image(&file, *i, name, path, place)?);
@@ -61,7 +69,7 @@ impl DatasetLayout for Nerfstudio {
         let splits = splits(&file, frames, &held_out(&places), &mut notes)?;
         let points = points(&file, &splits, options, &mut notes)?;
         let scene = Scene::new(self.name(), root, splits, points, options.background)?;
-        Ok(scene.with_notes(notes).with_reading(reading))
+        Ok(scene.with_notes(notes).with_reading(reading).with_seconds(seconds))
     }
 }
 
@@ -83,11 +91,11 @@ fn frame_names(paths: &[String]) -> Vec<String> {
 /// An image that exists: its number in `frames`, the path that the file names, and the path that it has.
 type Present = ((usize, PathBuf), PathBuf);
 
-/// The cameras of `found`, and times: from `time` if every frame has one, otherwise those of `found`.
-fn places_of(file: &Transforms, present: &[Present], mut found: Sequence) -> Result<Sequence, DataError> {
+/// `time` of each frame in the unit of the file; `None` where no frame has one.
+fn given_times(file: &Transforms, present: &[Present]) -> Result<Option<Vec<f64>>, DataError> {
     let timed = present.iter().filter(|((i, _), _)| file.frames[*i].get("time").is_some()).count();
     if timed == 0 {
-        return Ok(found);
+        return Ok(None);
     }
     let mut times = Vec::with_capacity(present.len());
     for ((i, _), _) in present {
@@ -95,7 +103,12 @@ fn places_of(file: &Transforms, present: &[Present], mut found: Sequence) -> Res
         let expected = "a finite number, as the other frames have";
         times.push(json::finite(&file.path, &field, file.frames[*i].get("time"), expected, REMEDY)?);
     }
-    // Times in [0, 1] stay as they are; others are mapped to that range.
+    Ok(Some(times))
+}
+
+/// Puts the times of the file in the place of those of the names. Times in [0, 1] stay as they are; others are mapped to that
+/// range.
+fn take_times(found: &mut Sequence, file: &Transforms, times: Vec<f64>) -> Result<(), DataError> {
     let range = TimeRange::of(&file.path, "frames[].time", &times)?;
     let stay = times.iter().all(|time| (0.0..=1.0).contains(time));
     found.reading.times =
@@ -103,7 +116,7 @@ fn places_of(file: &Transforms, present: &[Present], mut found: Sequence) -> Res
     for (place, time) in found.places.iter_mut().zip(times) {
         place.time = if stay { time } else { range.at(time) };
     }
-    Ok(found)
+    Ok(())
 }
 
 fn image(file: &Transforms, i: usize, name: String, path: &Path, place: &Place) -> Result<PosedImage, DataError> {

@@ -5,6 +5,7 @@ use super::{PrepareOptions, PrepareSummary, frame_names};
 use crate::atomic::write_atomically;
 use crate::error::DataError;
 use crate::layouts::colmap::model::{Model, ModelCamera, ModelImage};
+use crate::layouts::shared::files;
 use crate::lens::Distortion;
 use crate::ply::Encoding;
 use crate::programs::ffmpeg::Taken;
@@ -32,7 +33,11 @@ pub(super) fn dataset(
     let stands = cameras.len() > 1 && !options.moving_rig;
     let count = lists.first().map_or(0, Vec::len);
     // Frames of a single camera have the times at which they are shown. Those of a rig were taken evenly.
-    let shown = Taken::read(&options.out.join("images"), count).filter(|_| cameras.len() == 1);
+    let taken = taken(options, cameras)?;
+    // Of frames that were taken evenly, the number counts seconds at this rate.
+    let rate = if cameras.len() == 1 { 1.0 } else { taken.as_ref().map_or(0.0, Taken::rate) };
+    let is_timed = taken.is_some() && rate > 0.0;
+    let shown = taken.filter(|taken| cameras.len() == 1 && taken.seconds.len() == count);
     let seconds = shown.map_or_else(|| (0..count).map(|i| i as f64).collect(), |taken| taken.seconds);
     let mut placed = Vec::new();
     let mut used = 0;
@@ -65,10 +70,20 @@ pub(super) fn dataset(
         notes,
     };
     model.points.write_ply(&options.out.join("points3D.ply"), Encoding::BinaryLittleEndian)?;
-    let document = json!({ "ply_file_path": "points3D.ply", "frames": frames });
+    let mut document = json!({ "ply_file_path": "points3D.ply", "frames": frames });
+    if is_timed && last > first {
+        document["seconds"] = json!((last - first) / rate);
+    }
     let path = options.out.join("transforms.json");
     write_atomically(&path, |out| writeln!(out, "{document:#}"))?;
     Ok(summary)
+}
+
+/// The record of the frames of the first camera's video.
+fn taken(options: &PrepareOptions, cameras: &[String]) -> Result<Option<Taken>, DataError> {
+    let Some(camera) = cameras.first() else { return Ok(None) };
+    let folder = options.out.join("images").join(camera);
+    Ok(Taken::read(&folder, files::images(&folder)?.len()))
 }
 
 fn frame(name: &str, time: f64, image: &ModelImage, camera: &ModelCamera) -> Value {

@@ -4,6 +4,7 @@ mod unused;
 mod views;
 
 use crate::curves::CameraCurve;
+use crate::duration::usual_step;
 use crate::error::DataError;
 use crate::faults::capture_faults;
 use crate::frame::{Frame, MaskMeaning};
@@ -165,24 +166,23 @@ fn range(values: &[f32]) -> (f32, f32) {
 }
 
 fn times(scene: &Scene) -> String {
-    let mut times: Vec<f32> = all(scene).map(|frame| frame.time).collect();
-    times.sort_by(f32::total_cmp);
-    times.dedup();
+    let times = scene.times();
     let (Some(first), Some(last)) = (times.first(), times.last()) else { return String::new() };
     let source = if scene.reading.times.is_empty() { String::new() } else { format!(" ({})", scene.reading.times) };
     if times.len() == 1 {
         return format!("1: the scene stands still{source}");
     }
-    let mut steps: Vec<f32> = times.windows(2).map(|pair| pair[1] - pair[0]).collect();
-    steps.sort_by(f32::total_cmp);
-    let usual = steps[steps.len() / 2];
-    let gaps = steps.iter().filter(|step| **step > GAP * usual).count();
-    let gaps = match gaps {
+    let usual = usual_step(&times).unwrap_or(1.0);
+    let steps = || times.windows(2).map(|pair| (pair[1] - pair[0]) / usual);
+    let longest = steps().fold(0.0, f32::max);
+    let gaps = match steps().filter(|step| *step > GAP).count() {
         0 => String::new(),
-        1 => format!(", 1 gap of {:.1} steps", steps[steps.len() - 1] / usual),
-        count => format!(", {count} gaps of up to {:.1} steps", steps[steps.len() - 1] / usual),
+        1 => format!(", 1 gap of {longest:.1} steps"),
+        count => format!(", {count} gaps of up to {longest:.1} steps"),
     };
-    format!("{} from {first} to {last}{gaps}{source}", times.len())
+    let seconds = |seconds: f64| format!(" in {:.2} s", seconds * f64::from(last - first));
+    let seconds = scene.seconds.map_or_else(String::new, seconds);
+    format!("{} from {first} to {last}{seconds}{gaps}{source}", times.len())
 }
 
 fn masks(scene: &Scene, faults: &mut Vec<String>, problems: &mut Vec<String>) -> Result<String, DataError> {

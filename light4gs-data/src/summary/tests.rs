@@ -52,6 +52,9 @@ fn what_was_read_is_said() {
     );
     let times = fact(&summary, "times");
     assert_eq!(times, "8 from 0 to 1, 1 gap of 2.0 steps (the last number in the images' names)");
+    let rated = LoadOptions { frames_a_second: Some(4.0), ..Default::default() };
+    let rated = CaptureSummary::of(&Scene::open(root, &rated).unwrap()).unwrap();
+    assert!(fact(&rated, "times").starts_with("8 from 0 to 1 in 1.75 s, 1 gap"), "{rated:?}");
     let points = fact(&summary, "points");
     assert!(points.starts_with("2000, ") && points.ends_with(" in the view of a camera"), "{points}");
     assert_eq!(fact(&summary, "not used"), "1 image in depth, 1 image in images");

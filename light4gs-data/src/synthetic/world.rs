@@ -1,6 +1,8 @@
-//! The procedural scene: solids, their motion and their textures.
+//! The procedural scene of the quickstart: its solids and their motion.
 
 use super::shapes::Shape;
+use super::solid::Solid;
+use super::texture::{Pattern, Texture, hue_color};
 use glam::{Mat3, Vec3};
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
@@ -8,89 +10,6 @@ use std::f32::consts::{FRAC_PI_2, PI, TAU};
 
 /// Height of the ground disc, world units.
 const GROUND: f32 = -0.6;
-
-/// A smooth pattern between two colors; wavelengths are a tenth of an image or so.
-#[derive(Clone, Copy, Debug)]
-struct Texture {
-    colors: [Vec3; 2],
-    kind: Pattern,
-    /// Radians for each world unit.
-    frequency: f32,
-    phase: f32,
-}
-
-#[derive(Clone, Copy, Debug)]
-enum Pattern {
-    /// Bands across the solid's z axis.
-    Stripes,
-    /// Soft cubes.
-    Checker,
-    /// Sectors around the solid's z axis; the frequency is their number.
-    Sectors,
-    /// Circles and sectors around the z axis.
-    Target,
-}
-
-impl Texture {
-    fn color(&self, p: Vec3) -> Vec3 {
-        let angle = p.y.atan2(p.x);
-        let wave = |x: f32| (self.frequency * x + self.phase).sin();
-        let value = match self.kind {
-            Pattern::Stripes => wave(p.z),
-            Pattern::Checker => wave(p.x) * wave(p.y) * wave(p.z) * 1.6,
-            Pattern::Sectors => (self.frequency.round() * angle + self.phase).sin(),
-            Pattern::Target => {
-                let radius = p.truncate().length();
-                wave(radius) * (6.0 * angle).sin() * (3.0 * radius).min(1.0)
-            }
-        };
-        // A soft edge: steeper than the sine, still without a jump.
-        let mix = 0.5 + 0.5 * (1.8 * value).tanh();
-        self.colors[0].lerp(self.colors[1], mix)
-    }
-}
-
-/// A solid at one time.
-#[derive(Clone, Copy, Debug)]
-pub(super) struct Solid {
-    shape: Shape,
-    texture: Texture,
-    /// Own to world axes.
-    rotation: Mat3,
-    center: Vec3,
-    /// Radius of a sphere around the center that contains it.
-    pub(super) bound: f32,
-    /// Whether it is elsewhere, or turned, at another time.
-    pub(super) moves: bool,
-}
-
-/// Where a ray hits the world.
-pub(super) struct Hit {
-    pub(super) distance: f32,
-    pub(super) normal: Vec3,
-    pub(super) color: Vec3,
-}
-
-impl Solid {
-    /// Whether a ray comes near enough that the exact test is needed.
-    pub(super) fn may_hit(&self, origin: Vec3, direction: Vec3) -> bool {
-        let to_center = self.center - origin;
-        let along = to_center.dot(direction);
-        (to_center - direction * along).length_squared() <= self.bound * self.bound
-    }
-
-    /// The first intersection: distance, normal and texture color.
-    pub(super) fn hit(&self, origin: Vec3, direction: Vec3, nearer_than: f32) -> Option<Hit> {
-        let to_own = self.rotation.transpose();
-        let (o, d) = (to_own * (origin - self.center), to_own * direction);
-        let (distance, normal) = self.shape.hit(o, d)?;
-        (distance < nearer_than).then(|| Hit {
-            distance,
-            normal: self.rotation * normal,
-            color: self.texture.color(o + d * distance),
-        })
-    }
-}
 
 /// The scene at all times.
 #[derive(Debug)]
@@ -168,15 +87,6 @@ impl World {
     }
 }
 
-/// Hue (turns), saturation and value to red, green, blue.
-fn hue_color(hue: f32, saturation: f32, value: f32) -> Vec3 {
-    let channel = |shift: f32| {
-        let x = ((hue + shift).rem_euclid(1.0) * 6.0 - 3.0).abs() - 1.0;
-        value * (1.0 - saturation + saturation * x.clamp(0.0, 1.0))
-    };
-    Vec3::new(channel(0.0), channel(2.0 / 3.0), channel(1.0 / 3.0))
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -195,12 +105,5 @@ mod tests {
             }
             before = now;
         }
-    }
-
-    #[test]
-    fn hues() {
-        assert_eq!(hue_color(0.0, 1.0, 1.0), Vec3::X);
-        assert!((hue_color(1.0 / 3.0, 1.0, 1.0) - Vec3::Y).length() < 1e-5);
-        assert_eq!(hue_color(0.4, 0.0, 0.5), Vec3::splat(0.5));
     }
 }

@@ -61,7 +61,7 @@ impl DatasetLayout for Colmap {
                         a transforms.json (mask_path), see docs/data.md".to_owned());
         }
         let names: Vec<String> = posed.iter().map(|image| image.name.clone()).collect();
-        let Sequence { places, mut reading } = sequence(&names, options);
+        let Sequence { places, mut reading, .. } = sequence(&names, options);
         reading.unposed = unposed;
         let mut posed = posed;
         for (image, place) in posed.iter_mut().zip(&places) {

@@ -30,13 +30,21 @@ pub(super) struct RigFrame {
     pub(super) instant: f64,
 }
 
+/// The frames of a rig.
+pub(super) struct Rig {
+    /// Those of each camera.
+    pub(super) frames: Vec<Vec<RigFrame>>,
+    /// Frames a second, where all were taken from videos.
+    pub(super) rate: Option<f64>,
+}
+
 /// The frames of each camera. Those of videos are extracted first, see [`taking::folder`].
 pub(super) fn find(
     root: &Path,
     cameras: &[CameraFrames],
     length: Option<usize>,
     notes: &mut Vec<String>,
-) -> Result<Vec<Vec<RigFrame>>, DataError> {
+) -> Result<Rig, DataError> {
     let folders: Vec<Folder> =
         cameras.par_iter().map(|camera| taking::folder(root, camera, length)).collect::<Result<_, _>>()?;
     let lists = folders.iter().map(|folder| images(&folder.path)).collect::<Result<Vec<_>, _>>()?;
@@ -62,8 +70,11 @@ pub(super) fn find(
         None => None,
     };
     Ok(match timed {
-        Some(instants) => lists.into_iter().zip(instants).map(|(list, instants)| shown(list, &instants)).collect(),
-        None => by_numbers(lists, notes),
+        Some((instants, rate)) => {
+            let frames = lists.into_iter().zip(instants).map(|(list, instants)| shown(list, &instants)).collect();
+            Rig { frames, rate: Some(rate) }
+        }
+        None => Rig { frames: by_numbers(lists, notes), rate: None },
     })
 }
 
@@ -153,13 +164,13 @@ fn by_numbers(lists: Vec<Vec<PathBuf>>, notes: &mut Vec<String>) -> Vec<Vec<RigF
     lists.into_iter().enumerate().map(of_camera).collect()
 }
 
-/// The instants of the frames of videos that begin at the same time; `None` where there are too few frames to tell a rate.
+/// The instants of the frames of videos that begin at the same time, and how many there are a second; `None` where there are too few frames to tell a rate.
 fn by_times(
     root: &Path,
     records: &[Taken],
     length: Option<usize>,
     notes: &mut Vec<String>,
-) -> Result<Option<Vec<Vec<f64>>>, DataError> {
+) -> Result<Option<(Vec<Vec<f64>>, f64)>, DataError> {
     let mut rates: Vec<f64> = records.iter().map(Taken::rate).collect();
     if rates.contains(&0.0) {
         return Ok(None);
@@ -205,5 +216,6 @@ fn by_times(
         notes.push("the rate of some videos varies: each frame has the time at which it is shown".to_owned());
     }
     let instant = |(k, seconds): (usize, &f64)| if regular { k as f64 } else { seconds * rate };
-    Ok(Some(records.iter().map(|record| record.seconds.iter().enumerate().map(instant).collect()).collect()))
+    let instants = records.iter().map(|record| record.seconds.iter().enumerate().map(instant).collect()).collect();
+    Ok(Some((instants, rate)))
 }

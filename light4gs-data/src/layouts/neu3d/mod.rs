@@ -3,7 +3,8 @@
 //! `poses_bounds.npy` has a row for each camera, in LLFF's axes. `camXX/images` (or `camXX` itself) holds the frames of
 //! a camera, or `camXX.mp4` its video, from which they are extracted. As in the 4DGS reference, poses are neither
 //! centered nor scaled, the first camera is held out, and the time of frame `i` is `i` divided by the length of the
-//! sequence. Frames of videos with different or varying rates have the times at which they are shown.
+//! sequence. Frames of videos with different or varying rates have the times at which they are shown. Where frames are not taken
+//! from videos, they are 30 a second, the rate of the dataset.
 
 mod cameras;
 mod frames;
@@ -22,10 +23,12 @@ use crate::options::LoadOptions;
 use crate::points::PointCloud;
 use crate::scene::{Scene, SplitFrames};
 use cameras::CameraFrames;
-use frames::RigFrame;
+use frames::{Rig, RigFrame};
 use glam::{DMat3, DVec3};
 use std::path::Path;
 
+/// Frames a second of the dataset, as its authors say. Frames in folders do not say it.
+const RATE: f64 = 30.0;
 /// Numbers of a row: a pose of 3 × 5, and the nearest and farthest depth.
 const COLUMNS: usize = 17;
 
@@ -60,7 +63,7 @@ impl DatasetLayout for Neu3d {
                 cameras.len()
             ));
         }
-        let found = frames::find(root, &cameras, options.frames, &mut notes)?;
+        let Rig { frames: found, rate } = frames::find(root, &cameras, options.frames, &mut notes)?;
         // The instant after the last one.
         let length = found.iter().flatten().map(|frame| frame.instant + 1.0).fold(1.0, f64::max);
         let wanted = options.frames.map_or(length, |wanted| wanted as f64);
@@ -87,7 +90,7 @@ impl DatasetLayout for Neu3d {
             None => PointCloud::in_front_of(&splits.train, options),
         };
         let scene = Scene::new(self.name(), root, splits, points, options.background)?;
-        Ok(scene.with_notes(notes))
+        Ok(scene.with_notes(notes).with_seconds(Some(wanted / rate.unwrap_or(RATE))))
     }
 }
 

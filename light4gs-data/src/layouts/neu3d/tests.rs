@@ -59,6 +59,7 @@ fn cameras_of_a_rig_have_one_clock() {
     let scene = rig.open(None).unwrap();
     assert!(scene.notes.is_empty(), "{:?}", scene.notes);
     assert_eq!(Rig::times(&scene, 1), (0..12).map(|i| i as f32 / 12.0).collect::<Vec<_>>());
+    assert!(scene.seconds.is_some_and(|seconds| (seconds - 0.4).abs() < 1e-3), "{:?}", scene.seconds);
     // Another rate in the same time: each frame when it is shown.
     let scene = Rig::new(&[&usual, &usual, &slow]).open(None).unwrap();
     assert!(scene.notes.iter().any(|note| note.contains("25.00 frames a second")), "{:?}", scene.notes);

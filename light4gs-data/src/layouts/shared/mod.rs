@@ -7,6 +7,7 @@ mod moment;
 pub(super) mod names;
 pub(super) mod npy;
 pub(super) mod posed;
+pub(super) mod seconds;
 pub(super) mod sequence;
 pub(super) mod times;
 pub(super) mod transforms;

@@ -32,6 +32,8 @@ pub(in crate::layouts) struct Sequence {
     /// One for each image.
     pub(in crate::layouts) places: Vec<Place>,
     pub(in crate::layouts) reading: Reading,
+    /// Intervals of frames from time 0 to time 1, where numbers in the names count frames.
+    pub(in crate::layouts) intervals: Option<f64>,
 }
 
 /// What a name says: its camera, and what counts its time.
@@ -85,23 +87,27 @@ pub(in crate::layouts) fn sequence(names: &[String], options: &LoadOptions) -> S
             .and_then(|keys| places(&keys, chosen, SPARSEST))
     };
     let (found, times) = match (by_moment(), by_number) {
-        (Some(places), _) => (places, "the date and time of day in the images' names"),
+        // Its span are seconds.
+        (Some((places, _)), _) => ((places, None), "the date and time of day in the images' names"),
         (None, by_number) => match by_number() {
-            Some((places, true)) => {
-                ((places, true), "the order of the numbers in the images' names, which have large gaps")
+            Some((places, None)) => {
+                ((places, None), "the order of the numbers in the images' names, which have large gaps")
             }
             Some(found) => (found, "the last number in the images' names"),
-            None => ((in_order(names, options.cameras), false), "the order of the images' names, one step each"),
+            None => {
+                let places = in_order(names, options.cameras);
+                ((places, None), "the order of the images' names, one step each")
+            }
         },
     };
-    let places = found.0;
+    let (places, intervals) = found;
     let cameras = places.iter().map(|place| place.camera).max().map_or(0, |last| last + 1);
     let cameras = match (cameras, options.cameras) {
         (1, _) => "one moving camera".to_owned(),
         (count, CamerasFrom::Folder) => format!("{count}, one a folder"),
         (count, _) => format!("{count}, by the text of the images' names and folders beside what counts the time"),
     };
-    Sequence { places, reading: Reading { cameras, times: times.to_owned(), unposed: 0 } }
+    Sequence { places, reading: Reading { cameras, times: times.to_owned(), unposed: 0 }, intervals }
 }
 
 /// Whether moments in names are meant as such. A time of day without a date is one only where it runs on: cameras that are
@@ -139,9 +145,10 @@ fn in_order(names: &[String], cameras: CamerasFrom) -> Vec<Place> {
     places
 }
 
-/// Places of images, and whether ranks stand for times since the gaps between them are too large. `None` where the keys
+/// Places of images, and what they count from the first to the last; `None` for that where ranks stand for times, since the gaps
+/// between them are too large. `None` altogether where the keys
 /// count something else than times: there are as many cameras as names, or two images have the same place.
-fn places(keys: &[Key], chosen: bool, sparsest: f64) -> Option<(Vec<Place>, bool)> {
+fn places(keys: &[Key], chosen: bool, sparsest: f64) -> Option<(Vec<Place>, Option<f64>)> {
     let mut cameras: Vec<&str> = keys.iter().map(|(camera, _)| camera.as_str()).collect();
     cameras.sort_by(|a, b| natural(a, b));
     cameras.dedup();
@@ -166,7 +173,7 @@ fn places(keys: &[Key], chosen: bool, sparsest: f64) -> Option<(Vec<Place>, bool
     let numbers: HashMap<&str, u32> = cameras.iter().enumerate().map(|(i, name)| (*name, i as u32)).collect();
     Some((
         keys.iter().map(|(name, instant)| Place { camera: numbers[name.as_str()], time: time(*instant) }).collect(),
-        sparse,
+        (!sparse).then_some(last - first),
     ))
 }
 

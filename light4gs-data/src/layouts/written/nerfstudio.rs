@@ -102,6 +102,48 @@ fn own_intrinsics_times_and_splits() {
 }
 
 #[test]
+fn seconds_follow_from_a_rate_and_times_in_any_unit() {
+    let folder = tempfile::tempdir().unwrap();
+    let capture = Capture::moving("frame_", 6, None);
+    let seconds = |change: &dyn Fn(&mut Value)| {
+        let mut document = document(&capture, true);
+        change(&mut document);
+        write(folder.path(), &capture, &document);
+        let scene = Scene::open(folder.path(), &options()).unwrap();
+        (scene.seconds.map(|seconds| (1e6 * seconds).round() / 1e6), scene.notes.join("\n"))
+    };
+    let timed = |time: fn(i32) -> f64| {
+        move |v: &mut Value| {
+            v["fps"] = json!(5);
+            for i in 0..6 {
+                v["frames"][i as usize]["time"] = json!(time(i));
+            }
+        }
+    };
+    let found = |change: &dyn Fn(&mut Value)| seconds(change).0;
+    assert_eq!(found(&|_| ()), None);
+    // Numbers in names; seconds of a short and of a longer part; numbers of frames, from any on; shares.
+    assert_eq!(found(&|v| v["fps"] = json!(5)), Some(1.0));
+    assert_eq!(found(&timed(|i| 0.2 * f64::from(i))), Some(1.0));
+    assert_eq!(found(&timed(|i| 7.0 + 0.2 * f64::from(i))), Some(1.0));
+    assert_eq!(found(&timed(|i| f64::from(100 + i))), Some(1.0));
+    assert_eq!(found(&timed(|i| f64::from(i) / 10.0)), Some(2.0));
+    // Seconds, where frames were left out.
+    assert_eq!(found(&timed(|i| 0.4 * f64::from(i * i))), Some(10.0));
+    let gap = |v: &mut Value| {
+        v["fps"] = json!(10.0);
+        v["frames"].as_array_mut().unwrap().remove(2);
+    };
+    assert_eq!(found(&gap), Some(0.5));
+    assert_eq!(found(&|v| v["seconds"] = json!(12.5)), Some(12.5));
+    for bad in [json!(0), json!(-30), json!("30"), json!([30])] {
+        let (found, notes) = seconds(&|v| v["fps"] = bad.clone());
+        assert!(found.is_none() && notes.contains("fps is") && notes.contains("no positive number"), "{notes}");
+    }
+    assert_eq!(seconds(&|v| v["fps"] = json!(null)), (None, String::new()));
+}
+
+#[test]
 fn damaged_files_are_named() {
     let folder = tempfile::tempdir().unwrap();
     let capture = Capture::moving("frame_", 3, None);

@@ -57,6 +57,10 @@ fn a_rig_reads_back() {
     assert_eq!((scene.train.len(), scene.test.len(), scene.video.len()), (8, 4, 300));
     assert!(scene.test.iter().all(|frame| frame.camera_id == 0));
     assert_eq!(times(&scene, Split::Train), [0.0, 0.25, 0.5, 0.75]);
+    assert_eq!(scene.seconds, Some(4.0 / 30.0));
+    let slower = LoadOptions { frames_a_second: Some(20.0), ..options() };
+    let seconds = Scene::open(folder.path(), &slower).unwrap().seconds;
+    assert!(seconds.is_some_and(|seconds| (seconds - 0.2).abs() < 1e-6), "{seconds:?}");
     // Random points lie around the place that the cameras look at.
     let mean = scene.points.positions.iter().fold(Vec3::ZERO, |sum, p| sum + Vec3::from(*p)) / 2000.0;
     assert!(mean.length() < 0.3, "{mean}");
