@@ -77,6 +77,10 @@ pub struct LoadOptions {
     /// Frames a second at which the capture was taken, 0.001 to 100000: its different times are counted as frames, whatever its files
     /// say. `None`: as the files say, see [`crate::Scene::seconds`].
     pub frames_a_second: Option<f64>,
+    /// First and last time that is kept, shares of the whole: see [`crate::Scene::between`]. `None`: all.
+    pub between: Option<[f64; 2]>,
+    /// Training frames have at most this number of times: see [`crate::Scene::thinned`]. `None`: all.
+    pub most_times: Option<usize>,
     /// The color behind transparent pixels: red, green, blue in `[0, 1]`.
     pub background: [f32; 3],
     /// Seed of the random point cloud.
@@ -104,6 +108,8 @@ impl Default for LoadOptions {
             resolution: Resolution::Native,
             frames: None,
             frames_a_second: None,
+            between: None,
+            most_times: None,
             background: [1.0; 3],
             seed: 0,
             random_points: 2000,

@@ -96,6 +96,9 @@ pub fn load_options(config: &Config) -> LoadOptions {
         times: config.data.times.into(),
         cameras: config.data.cameras.into(),
         synchronize: config.data.synchronize,
+        frames_a_second: Some(config.data.frames_a_second).filter(|rate| *rate > 0.0),
+        between: Some(config.data.between).filter(|window| *window != [0.0, 1.0]),
+        most_times: config.data.most_times,
     }
 }
 
@@ -120,8 +123,7 @@ pub fn scene_meta(config: &Config, data: &Scene) -> SceneMeta {
         // A folder may have any name.
         name: legal_name(&data.name),
         frame_count: times.len() as u32,
-        // Times are shares of the whole, whose duration is not known.
-        fps: 0.0,
+        fps: data.seconds.filter(|_| times.len() > 1).map_or(0.0, |seconds| ((times.len() - 1) as f64 / seconds) as f32),
         bounds,
         background: data.background,
         config_digest: config.digest(),

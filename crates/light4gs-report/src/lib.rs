@@ -9,6 +9,7 @@
 //! |---|---|
 //! | measure a finished run, and write its report | [`evaluate_run`] |
 //! | write a report from results at hand | [`write_report`] with a [`Report`]; parts that are empty are left out |
+//! | show a take over its seconds | [`take_page`] |
 //! | write another page in the same style | [`page_of`] |
 //! | show what a capture is taken for, before it is trained | [`capture_page`] |
 //! | embed an image in HTML | [`data_uri`], with [`escape`] for texts and [`inferno`] for maps |
@@ -39,6 +40,7 @@ mod images;
 mod quality;
 mod run;
 mod sizes;
+mod take;
 
 use std::fmt::Write as _;
 use std::io::Write as _;
@@ -57,6 +59,7 @@ pub use html::escape;
 use html::fill;
 pub use images::data_uri;
 pub use run::evaluate_run;
+pub use take::take_page;
 
 const PAGE: &str = include_str!("page.html");
 const STYLE: &str = include_str!("style.css");

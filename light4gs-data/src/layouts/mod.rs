@@ -135,6 +135,12 @@ impl Scene {
         if options.synchronize {
             scene.put_in_step(options)?;
         }
+        if let Some([from, to]) = options.between {
+            scene = scene.between(from, to)?;
+        }
+        if let Some(times) = options.most_times {
+            scene = scene.thinned(times);
+        }
         Ok(scene)
     }
 }

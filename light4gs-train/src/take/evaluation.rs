@@ -10,7 +10,7 @@ use crate::error::TrainError;
 use crate::metrics::{image_tensor, psnr, ssim};
 
 /// Frames on each side of a join that count as being at it.
-const AT_JOIN: usize = 5;
+pub const AT_JOIN: usize = 5;
 
 /// A frame of the dataset, and how the take shows it.
 #[derive(Clone, Debug, Serialize)]

@@ -29,6 +29,7 @@ use super::check_output;
 use super::limits::LimitsArgument;
 use super::output::progress::FitBar;
 use super::output::{say, say_json, tell};
+use super::take::{self, is_take_file};
 use super::train::{coding_table, sections_table};
 use super::wishes::{bytes, check_quality, decibels};
 
@@ -178,6 +179,9 @@ pub(super) struct Info {
 
 impl Info {
     pub(super) fn run(self) -> Result<(), TrainError> {
+        if is_take_file(&self.file) {
+            return take::info(&self.file, &self.limits.get(), self.json);
+        }
         print_info(&read_info_with_limits(&self.file, &self.limits.get())?, self.json)
     }
 }

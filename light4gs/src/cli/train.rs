@@ -17,6 +17,7 @@ use light4gs_train::metrics::lpips::Lpips;
 use light4gs_train::metrics::scores::Scores;
 use light4gs_train::run::{RunFolder, RunRecord};
 use light4gs_train::table::{Align, Table};
+use light4gs_train::take::TakeFolder;
 use light4gs_train::trainer::{Trainer, TrainerBuilder};
 
 use super::check::{refuse_problems, tell_capture, understand};
@@ -25,7 +26,7 @@ use super::limits::LimitsArgument;
 use super::output::progress::ProgressBars;
 use super::output::{say, say_json, tell};
 use super::signals::stop_flag;
-use super::take::train_take;
+use super::take::{self, train_take};
 use super::videos;
 use super::wishes::{Wishes, check_quality};
 
@@ -287,6 +288,9 @@ impl Eval {
         if self.run.is_file() {
             return self.eval_file();
         }
+        if TakeFolder::is_one(&self.run) {
+            return take::eval_folder(&self.run, self.json);
+        }
         let (mut folder, mut record, mut config) = RunFolder::open(&self.run)?;
         folder.lock()?;
         if !folder.stream().exists() {
@@ -315,6 +319,10 @@ impl Eval {
             return Err(TrainError::Input("a .l4gs file holds no images; name the dataset with --scene DIR".into()));
         };
         let name = self.device.unwrap_or_default();
+        if take::is_take_file(&self.run) {
+            let config = Config { device: name, ..Config::default() };
+            return take::eval_file(&self.run, &scene, &config, &self.limits.get(), self.json);
+        }
         let device = device::open(name)?;
         let decoded: DecodedScene = DecodedScene::open_with_limits(&self.run, &self.limits.get(), &device)?;
         let mut config = Config::default();

@@ -1,5 +1,6 @@
 //! Takes: `train --segment`, `join`, and the task that launchers start.
 
+mod measure;
 mod task;
 
 use std::path::{Path, PathBuf};
@@ -12,6 +13,7 @@ use light4gs_train::dataset::load_options;
 use light4gs_train::error::TrainError;
 use light4gs_train::take::{TakeFolder, TakePlan};
 
+pub(super) use measure::{eval_file, eval_folder, info, is_take_file};
 pub(super) use task::TakeTask;
 
 use super::launch::{LaunchOptions, Launcher, TaskFolder, local, slurm};
