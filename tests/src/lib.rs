@@ -17,7 +17,11 @@ pub mod raster;
 pub mod splat_scene;
 pub mod twin;
 
-/// The README's program compiles and runs.
+/// The program of the page on the library compiles and runs, and what the README has in Rust.
 #[cfg(doctest)]
-#[doc = include_str!("../../README.md")]
-pub struct Readme;
+pub mod pages {
+    #[doc = include_str!("../../docs/library.md")]
+    pub struct Library;
+    #[doc = include_str!("../../README.md")]
+    pub struct Readme;
+}

@@ -16,11 +16,11 @@ keys! {
         profile: FileProfile = FileProfile::Compact;
             FileProfile::BOUNDS,
             "ours; paper";
-        /// The most bytes of the file, of which it uses nearly all: training adapts the weight of the rate, and the encoder
-        /// adapts the steps of the attributes. 0: no bound; the size follows from lambda and the steps.
+        /// Upper bound of the file in bytes; the file uses nearly all of it. Training adapts the weight of the rate, and the
+        /// encoder adapts the steps of the attributes. 0: no bound; the size follows from lambda and the steps.
         target_bytes: usize = 0; Whole { least: 0, most: 1_000_000_000_000 }, "ours";
-        /// The least PSNR of the decoded file on the test views (on the training views if there are none), in dB. The file is
-        /// hardly better than that: weight and steps are adapted as with `target_bytes`. 0: no bound.
+        /// Lower bound of the PSNR of the decoded file on the test views (on the training views if there are none), in dB. The
+        /// file is hardly better: weight and steps are adapted as with `target_bytes`. 0: no bound.
         target_db: f64 = 0.0; DECIBELS, "ours";
         /// Layers of Gaussians in the file, the most significant ones first: with more than 1 a player shows a coarse scene
         /// after the first few bytes. Each layer has twice as many as the one before. More layers take some percent more
@@ -87,7 +87,7 @@ keys! {
         attributes: bool = false; Flag, "ours, after HAC++";
         /// Weight of a megabyte of these attributes in the loss.
         attribute_lambda: f64 = 0.03; WEIGHT, "ours";
-        /// Iterations from one that has the rate in its loss to the next such iteration.
+        /// Every how many iterations the rate is part of the loss.
         interval: usize = 3; Whole { least: 1, most: 1000 }, "paper";
         /// Share of the planes, and of the Gaussians, on which the rate is estimated. The estimate is unbiased.
         fraction: f64 = 0.125; Number { least: 1e-6, most: 1.0 }, "ours";

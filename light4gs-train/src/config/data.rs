@@ -24,7 +24,7 @@ choice! {
     /// How cameras follow from the images' names, in layouts that do not name cameras.
     #[derive(Default)]
     pub enum CamerasKind: "source of cameras" {
-        /// The folder, and the name without what counts the time.
+        /// One camera for each folder, and for each name without the part that counts the time.
         #[default]
         Auto = "auto",
         /// There is one camera, which moves.
@@ -86,7 +86,7 @@ keys! {
         /// Where the times of images come from, in the layouts `colmap` and `nerfstudio`, if their files have none. `light4gs
         /// check` says what was read.
         times: TimesKind = TimesKind::Auto; TimesKind::BOUNDS, "ours";
-        /// Which images are of one camera, in the same layouts.
+        /// How images are grouped into cameras, in the same layouts.
         cameras: CamerasKind = CamerasKind::Auto; CamerasKind::BOUNDS, "ours";
         /// Whether cameras of a rig that are some frames ahead of the others, or behind, are moved in time. Without it,
         /// `train` and `check` only say so.

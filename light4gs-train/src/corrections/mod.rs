@@ -48,9 +48,9 @@ const CORRECTION_RATE: light4gs_keys::Bounds = Number { least: 1e-20, most: 0.1 
 keys! {
     /// What is corrected.
     pub struct CorrectionsConfig {
-        /// What has a gain and an offset of its own for each color channel. They are learned and are not in the file.
+        /// Unit with a learned gain and offset of each color channel. They are not in the file.
         exposure: CorrectionUnit = CorrectionUnit::None; CorrectionUnit::BOUNDS, "ours";
-        /// What has a small turn and translation of its own. `"camera"` is for rigs that stand still. With `"frame"`, a camera
+        /// Unit with a learned small rotation and translation. `"camera"` is for rigs that stand still. With `"frame"`, a camera
         /// that stands still has one for all of its frames.
         poses: CorrectionUnit = CorrectionUnit::None; CorrectionUnit::BOUNDS, "ours";
         /// The times of each camera of a rig are corrected by an offset.

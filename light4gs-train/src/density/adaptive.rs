@@ -39,7 +39,7 @@ keys! {
         grad_threshold_fine_final: f32 = 2e-4; THRESHOLD, "reference";
         /// Gaussians up to this share of the scene's extent are cloned, larger ones split in two.
         percent_dense: f32 = 0.01; Number { least: 1e-9, most: 1e9 }, "3DGS";
-        /// Most Gaussians: where more would be cloned or split, those with the largest gradients are.
+        /// Largest number of Gaussians. At this bound, those with the largest gradients are cloned or split first.
         max_gaussians: usize = 360_000; Whole { least: 1, most: MOST_GAUSSIANS }, "reference; the largest first: ours";
         /// Opacity below which a Gaussian is removed, coarse stage.
         opacity_threshold: f32 = 0.005; SHARE, "3DGS";

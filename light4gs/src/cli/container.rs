@@ -43,16 +43,16 @@ pub(super) struct Encode {
     /// The file to write.
     #[arg(long)]
     out: PathBuf,
-    /// Changes one key below `compression` for this file; may be given more than once. Where keys of `context`, `steps`
-    /// or `sh` change, the entropy models are fitted again to the finished scene. Where keys of `attributes` change,
-    /// steps that were learned in training are not used.
+    /// Changes one key below `compression` for this file; may be given more than once. If keys of `context`, `steps` or
+    /// `sh` change, the entropy models are fitted again to the finished scene. If keys of `attributes` change, the steps
+    /// that were learned in training are not used.
     #[arg(long = "set", value_name = "KEY=VALUE")]
     overrides: Vec<String>,
-    /// The most bytes of the file, such as 300k or 2M; nearly all of them are used: the steps of attributes are adapted.
+    /// Upper bound of the file in bytes, such as 300k or 2M; the file uses nearly all of it. Adapts the steps of attributes.
     #[arg(long, value_name = "NUMBER", value_parser = bytes)]
     target_bytes: Option<usize>,
-    /// The least PSNR of the decoded file on the test views, dB: the smallest file that has it is written. If none has it, the
-    /// best one is, and the exit code is 2.
+    /// Lower bound of the PSNR of the decoded file on the test views, dB: writes the smallest file above the bound. If there
+    /// is none, writes the best file, and the exit code is 2.
     #[arg(long, value_name = "NUMBER", value_parser = decibels, conflicts_with = "target_bytes")]
     target_db: Option<f64>,
     /// Layers of Gaussians, the most significant ones first: with more than 1, such as 4, a player shows a coarse scene after the

@@ -37,11 +37,11 @@ pub(super) struct Import {
     /// Folder of the new run; for a PLY the .l4gs file to write.
     #[arg(long)]
     out: PathBuf,
-    /// Folder of the dataset on which the scene was trained. With it the steps are searched on training images; without
-    /// it, on views around the scene.
+    /// Folder of the dataset of the scene's training. With it, steps are searched on training images; without it, on views
+    /// around the scene.
     #[arg(long)]
     scene: Option<PathBuf>,
-    /// A preset or a TOML file: how the scene will be coded. The model itself is given by the source.
+    /// A preset or a TOML file with the coding of the scene. The source gives the model itself.
     #[arg(long, default_value = "imported", value_name = "PRESET|FILE")]
     config: String,
     /// Changes one key of the configuration; may be given more than once.

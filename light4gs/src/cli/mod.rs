@@ -49,8 +49,8 @@ enum Command {
     #[command(after_help = "Examples:\n  light4gs prepare walk.mp4 --out data/walk\n  light4gs prepare left.mp4 \
                             middle.mp4 right.mp4 --out data/stage\n  light4gs train data/walk --out runs/walk")]
     Prepare(prepare::Prepare),
-    /// Say what a dataset is taken for, before anything is trained: cameras, times, lens, masks, points, and what is not
-    /// used. The exit code is 2 where training could only fail.
+    /// Print what is read from a dataset, before anything is trained: cameras, times, lens, masks, points, unused images.
+    /// The exit code is 2 if a training could only fail.
     #[command(after_help = "Example:\n  light4gs check data/walk --html walk.html")]
     Check(check::Check),
     /// Train on a dataset, or on videos, which are prepared first.
@@ -58,7 +58,7 @@ enum Command {
         after_help = "Examples:\n  light4gs train data/dnerf/bouncing --config dnerf-bouncing-cpu --out runs/bouncing\n  light4gs train walk.mp4 --out runs/walk"
     )]
     Train(train::Train),
-    /// Continue a run from its last checkpoint, to the same result as if it had not been interrupted.
+    /// Continue a run from its last checkpoint. The result is that of an uninterrupted run.
     #[command(after_help = "Example:\n  light4gs resume runs/bouncing")]
     Resume(train::Resume),
     /// Measure the decoded file of a run: PSNR, SSIM, FPS, bytes by section.
@@ -88,7 +88,7 @@ enum Command {
     #[command(after_help = "Example:\n  light4gs info bouncing.l4gs --json")]
     Info(container::Info),
     /// Write the Gaussians for other programs: PLY files at successive times, a single time as .ply or .glb, the motion
-    /// as .4dgs, that of control nodes as .glb; or the scene as a page that plays it.
+    /// as .4dgs (of control nodes also as .glb); or write a page that plays the scene.
     #[command(
         after_help = "Examples:\n  light4gs export bouncing.l4gs --out frames --frames 30\n  light4gs export bouncing.l4gs --html bouncing.html"
     )]
@@ -96,12 +96,12 @@ enum Command {
     /// Write the procedural scene of the quickstart as a D-NeRF dataset.
     #[command(after_help = "Example:\n  light4gs synth data/synthetic --resolution 200")]
     Synth(synth::Synth),
-    /// Make a table or a figure of the paper: train a scene several times with variants, and compare them.
+    /// Make a table or a figure of the paper: train variants of a scene, and compare them.
     #[command(
         after_help = "Example:\n  light4gs study context-model data/dnerf/flag --config dnerf-flag-cpu --seeds 3 --out runs/context"
     )]
     Study(study::Study),
-    /// Write a study's tables and report again from the runs that are finished, and name those that are missing.
+    /// Write a study's tables and report again from its finished runs, and name the missing runs.
     #[command(after_help = "Example:\n  light4gs gather runs/context")]
     Gather(study::Gather),
     /// One task of a study, as its launcher starts it.

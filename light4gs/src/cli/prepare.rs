@@ -25,7 +25,7 @@ pub(super) struct Prepare {
     /// Wider frames are scaled down to this width, in pixels.
     #[arg(long, default_value_t = 1600, value_name = "PIXELS")]
     max_width: u32,
-    /// The cameras of a rig move, so every frame gets a pose of its own. Without this option they stand still.
+    /// The cameras of a rig move: find a pose for every frame. By default, one pose for each camera.
     #[arg(long)]
     moving: bool,
     /// No progress.

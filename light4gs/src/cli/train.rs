@@ -47,8 +47,8 @@ pub(super) struct RunOutput {
 
 #[derive(Debug, Args)]
 pub(super) struct Train {
-    /// Folder of the dataset, or videos: one of a moving camera, or one for each camera of a rig. Videos are prepared in the
-    /// folder OUT-prepared first (see `light4gs prepare`); both parts continue where they were stopped.
+    /// Folder of the dataset, or videos: one of a moving camera, or one for each camera of a rig. Videos are first prepared in
+    /// the folder OUT-prepared (see `light4gs prepare`). An interrupted command continues where it stopped.
     #[arg(required = true, value_name = "SCENE|VIDEO")]
     scene: Vec<PathBuf>,
     /// A preset (see docs/configuration.md) or a TOML file. Without it: the preset of the dataset's layout, such as

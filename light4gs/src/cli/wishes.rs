@@ -21,20 +21,19 @@ const LONGEST: f64 = 50.0;
 
 #[derive(Debug, Args)]
 pub(super) struct Wishes {
-    /// Train on images whose longer side has this many pixels; smaller ones stay as they are. The number of Gaussians
-    /// follows.
+    /// Pixels of the longer side of the training images; smaller images are not enlarged. Adapts the number of Gaussians.
     #[arg(long, value_name = "NUMBER", value_parser = clap::value_parser!(u32).range(8..=16_384))]
     pixels: Option<u32>,
-    /// Train for about this long on this machine, whose speed is measured before the start. The number of iterations
-    /// follows.
+    /// Minutes of training on this machine, approximately. Adapts the number of iterations to the speed of the machine,
+    /// which is measured before the start.
     #[arg(long, value_name = "NUMBER", value_parser = minutes)]
     minutes: Option<f64>,
-    /// The most bytes of the file, such as 300k or 2M; nearly all of them are used. The number of Gaussians and the weight
-    /// of a byte in the loss follow.
+    /// Upper bound of the file in bytes, such as 300k or 2M; the file uses nearly all of it. Adapts the number of Gaussians
+    /// and the weight of a byte in the loss.
     #[arg(long, value_name = "NUMBER", value_parser = bytes)]
     target_bytes: Option<usize>,
-    /// The least PSNR of the decoded file on the test views, dB; it becomes hardly better. The weight of a byte in the loss
-    /// follows, in the last part of training. A run that does not reach it is kept, and the exit code is 2.
+    /// Lower bound of the PSNR of the decoded file on the test views, dB; the file is hardly better. Adapts the weight of a
+    /// byte in the loss in the last part of training. A run below the bound is kept, and the exit code is 2.
     #[arg(long, value_name = "NUMBER", value_parser = decibels, conflicts_with = "target_bytes")]
     target_db: Option<f64>,
 }

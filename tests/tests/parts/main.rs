@@ -13,6 +13,7 @@ mod finite_differences;
 mod gpu_kernels;
 mod import;
 mod operations;
+mod paper;
 mod plane_convolutions;
 mod poisoned_scenes;
 mod principal_point;

@@ -34,10 +34,10 @@ const FPS: RangeInclusive<f64> = 1e-3..=1e5;
 pub(super) struct Export {
     /// The .l4gs file.
     file: PathBuf,
-    /// A folder for `0000.ply`, `0001.ply`, ... (a name without a suffix or with a slash at its end, or an existing
-    /// folder; numbered PLY files of another sequence must not be there), or a file: a single time as .ply or .glb (KHR_gaussian_splatting), the whole motion as .4dgs, or as a .zip
-    /// with the same PLY files as the folder. A scene of control nodes becomes a .glb with its whole motion (skin and
-    /// animation), unless --time asks for a single time.
+    /// Folder or file. Folder (no suffix, a slash at the end, or an existing folder): `0000.ply`, `0001.ply`, ...; it must
+    /// not hold numbered PLY files of another sequence. .zip: the same PLY files. .ply, .glb (KHR_gaussian_splatting): a
+    /// single time. .4dgs: the whole motion. A .glb of control nodes has the whole motion too (skin and animation), unless
+    /// --time asks for a single time.
     #[arg(long, required_unless_present = "html")]
     out: Option<PathBuf>,
     /// One file that plays the scene in a browser without any other file.

@@ -51,7 +51,7 @@ pub(super) struct Study {
     /// stands for the scene's name.
     #[arg(long, value_name = "PRESET|FILE")]
     config: Option<String>,
-    /// The schedule of every variant this many times as long: 0.25 for a first look.
+    /// Factor of the length of every variant's schedule: 0.25 for a first look.
     #[arg(long, value_name = "FACTOR")]
     schedule: Option<f64>,
     /// Changes one key of every variant's configuration; may be given more than once.
@@ -63,11 +63,11 @@ pub(super) struct Study {
     /// Runs of each variant on each scene, with different seeds: tables then show mean and standard deviation.
     #[arg(long, default_value_t = 1, value_parser = clap::value_parser!(u64).range(1..=1000))]
     seeds: u64,
-    /// Folder of another study, whose equal trainings are not repeated. May be given more than once.
+    /// Folder of another study; its equal trainings are reused. May be given more than once.
     #[arg(long, value_name = "STUDY")]
     reuse: Vec<PathBuf>,
-    /// Only runs whose names SCENE/VALUE+VALUE/seed-K have these parts, such as 400,small,seed-0: one of the scenes, values of an
-    /// axis and seeds that are named. The other runs stay missing.
+    /// Only the runs with these parts in their names SCENE/VALUE+VALUE/seed-K, such as 400,small,seed-0. Several scenes,
+    /// values of one axis, or seeds are alternatives. The other runs stay missing.
     #[arg(long, value_delimiter = ',', value_name = "PART")]
     only: Vec<String>,
     /// Print the runs, without training.

@@ -47,13 +47,13 @@ const MOST_CAMERAS: usize = 500;
 
 #[derive(Debug, Args)]
 pub(super) struct View {
-    /// A .l4gs file, or the folder of a run: while it trains, the page follows its newest checkpoint.
+    /// A .l4gs file, or the folder of a run; during a training the page follows the newest checkpoint.
     #[arg(value_name = "FILE|RUN", required_unless_present = "trainer")]
     what: Option<PathBuf>,
     /// Dataset whose cameras the player offers; by default the run's own.
     #[arg(long)]
     scene: Option<PathBuf>,
-    /// In place of a scene, a page that trains one in the browser: the program that bindings/web/build-trainer makes.
+    /// Serve a page that trains a scene in the browser; FILE.wasm is the output of bindings/web/build-trainer.
     #[arg(long, value_name = "FILE.wasm", conflicts_with_all = ["what", "scene", "device"])]
     trainer: Option<PathBuf>,
     /// Port on this machine; 0 is any free one.

@@ -75,15 +75,15 @@ keys! {
         radius: f64 = 0.6; Number { least: 0.01, most: 100.0 }, "ours";
         /// Nodes are placed at Gaussians with at least this opacity.
         opacity: f64 = 0.15; Number { least: 1e-4, most: 0.999 }, "ours";
-        /// Every Gaussian learns which share of it stands still.
+        /// Every Gaussian learns a stillness: its logit for one more node, which never moves.
         stillness: bool = true; Flag, "ours";
-        /// The logit of standing still at the beginning, where 0 is that of a node's own place.
+        /// Stillness at the beginning. For comparison: at a node's own anchor, its logit is 0.
         stillness_start: f64 = -4.0; Number { least: -30.0, most: 30.0 }, "ours";
         /// Every Gaussian learns a lifetime: its opacity is multiplied by a bell curve over time, from the iteration on at
         /// which the sampler's window holds all times.
         lifetime: bool = false; Flag, "ours";
-        /// Number of affinities: learned numbers by which a Gaussian follows some nodes more than its distance from them says.
-        /// So a foot and the floor under it need not move together.
+        /// Number of affinities: length of a learned vector of each Gaussian and each node; the inner product of both is added
+        /// to the logit. So a foot and the floor under it need not move together.
         affinities: usize = 0; Whole { least: 0, most: MOST_AFFINITIES as u64 }, "after SC-GS";
         /// Weight of the term that keeps each node where its neighbors expect it (as rigid as possible).
         rigidity: f64 = 1.0; WEIGHT, "ours; SC-GS: 1e-4 to 0";
