@@ -81,7 +81,7 @@ pub fn evaluate_take(
     images: &dyn ImageSource,
     device: &Device,
 ) -> Result<TakeEvaluation, TrainError> {
-    let index = take.index();
+    let index = take.take().index();
     let seconds = index.meta().seconds;
     let interval = if index.meta().fps > 0.0 { 1.0 / f64::from(index.meta().fps) } else { 1.0 / 30.0 };
     let joins: Vec<f64> = index.segments().iter().skip(1).map(|segment| segment.times.begin).collect();

@@ -1,5 +1,6 @@
 //! The folder of a take in training: a run for the base, a run for each segment, and the file that they give.
 
+use std::io::Write;
 use std::path::{Path, PathBuf};
 
 use light4gs_codec::take::{NewSegment, TakeMeta, write_take};
