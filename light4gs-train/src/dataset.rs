@@ -86,6 +86,7 @@ pub fn load_options(config: &Config) -> LoadOptions {
     LoadOptions {
         layout: config.data.layout.clone(),
         frames: config.data.frames,
+        frames_a_second: other.frames_a_second,
         resolution: config.data.resolution.map_or(Resolution::Native, Resolution::MaxSide),
         background: config.data.background,
         seed: config.seed,
