@@ -102,6 +102,9 @@ impl Train {
         if self.segment.is_none() && (self.launch.jobs > 1 || self.launch.launcher != Launcher::Local) {
             return Err(TrainError::Input("--jobs and --launcher are for takes; give --segment SECONDS too".into()));
         }
+        if self.segment.is_some() {
+            self.wishes.refuse_targets()?;
+        }
         let config = self.wishes.config(&preset, &overrides, &scene, automatic, self.output.quiet)?;
         match self.segment {
             Some(segment) => train_take(&config, &scene, &self.out, segment, &self.launch, self.output.quiet),
