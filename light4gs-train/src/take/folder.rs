@@ -47,7 +47,13 @@ impl TakeFolder {
     ///
     /// # Errors
     /// [`TrainError::Input`] for a folder that holds something else; [`TrainError::Data`] for one that cannot be written.
-    pub fn create(root: &Path, scene: &Path, data: &Scene, plan: TakePlan, config: &Config) -> Result<Self, TrainError> {
+    pub fn create(
+        root: &Path,
+        scene: &Path,
+        data: &Scene,
+        plan: TakePlan,
+        config: &Config,
+    ) -> Result<Self, TrainError> {
         let cameras = (data.train.len() / plan.frames.max(1)).max(1);
         let record = TakeRecord {
             scene: std::path::absolute(scene).map_err(DataError::io("find", scene))?,

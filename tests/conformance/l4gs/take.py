@@ -165,7 +165,7 @@ def _read_slot(row: Reader, file_bytes: int, base_end: int, base_gaussians: int)
         row.require(-_LONGEST <= seconds <= _LONGEST, name, f"within {_LONGEST} seconds")
     begin, end, stream_begin, stream_end = times
     row.require(0 <= begin < end, "end", "begins from 0 on, and later ends")
-    row.require(stream_begin <= begin and end <= stream_end, "end of the stream", "times that enclose those of the segment")
+    row.require(stream_begin <= begin < stream_end, "end of the stream", "times within which the segment begins")
     offset = row.u64("offset")
     row.require(offset >= base_end, "offset", f"{base_end} or more, behind the base")
     length = row.u64("length")

@@ -3,9 +3,7 @@
 use burn::tensor::{Device, Int, Tensor};
 use light4gs_codec::GaussianArrays;
 use light4gs_data::{Camera, PointCloud};
-use light4gs_model::{
-    Backdrop, Gaussians, GaussiansConfig, PixelContribution, Rendering, Significance, Splatter,
-};
+use light4gs_model::{Backdrop, Gaussians, GaussiansConfig, PixelContribution, Rendering, Significance, Splatter};
 use light4gs_tests::golden::{assert_close_relative, devices, values_of};
 
 const BACKGROUND: [f32; 3] = [0.2, 0.4, 0.9];
@@ -56,7 +54,11 @@ fn the_image_and_the_gradients_are_those_of_one_scene() {
             let all_means = whole.means.clone();
             let expected = Splatter::new(BACKGROUND, degree).render(whole, &camera(), None);
 
-            assert_eq!(values_of(&drawn.image), values_of(&expected.image), "{name}, degrees {own_degree}, {still_degree}");
+            assert_eq!(
+                values_of(&drawn.image),
+                values_of(&expected.image),
+                "{name}, degrees {own_degree}, {still_degree}"
+            );
             assert_eq!(radii(&drawn), radii(&expected)[..own.len()], "{name}");
             let gradient = means.grad(&drawn.image.sum().backward()).expect("a gradient");
             let of_all = all_means.grad(&expected.image.sum().backward()).expect("a gradient");

@@ -20,8 +20,11 @@ fn filmed() -> Workspace {
 
 fn train(w: &Workspace, run: &str, more: &[&str]) -> Command {
     let mut command = w.command(["train", "rig", "--config", "dnerf-cpu", "--segment", "1", "--out", run, "--quiet"]);
-    let keys = TINY.into_iter().chain(TINY_COMPRESSION).chain(["model.field=nodes", "data.resolution=0", "device=flex"]);
-    keys.for_each(|key| drop(command.args(["--set", key])));
+    let keys =
+        TINY.into_iter().chain(TINY_COMPRESSION).chain(["model.field=nodes", "data.resolution=0", "device=flex"]);
+    for key in keys {
+        command.args(["--set", key]);
+    }
     command.args(more);
     command
 }
@@ -52,7 +55,8 @@ fn a_take_is_trained_in_parts_and_plays_as_one_file() {
     assert_success(&w.command(["join", "take"]).output().unwrap());
     assert_eq!(fs::read(&file).unwrap(), bytes);
 
-    let info: Value = serde_json::from_slice(&w.command(["info", "take/take.l4gs", "--json"]).output().unwrap().stdout).unwrap();
+    let info: Value =
+        serde_json::from_slice(&w.command(["info", "take/take.l4gs", "--json"]).output().unwrap().stdout).unwrap();
     assert_eq!(info["segments"].as_array().unwrap().len(), 3);
     let output = w.command(["eval", "take", "--json"]).output().unwrap();
     assert_success(&output);

@@ -95,7 +95,10 @@ fn train_missing(folder: &TakeFolder, launch: &LaunchOptions, quiet: bool) -> Re
 fn unfinished(folder: &TakeFolder, task: usize, part: &str) -> TrainError {
     let said = std::fs::read_to_string(folder.failure(task)).unwrap_or_default();
     let root = folder.root().display();
-    TrainError::Input(format!("{part} is not finished: {} (the same command goes on; logs are in {root}/.logs)", said.trim()))
+    TrainError::Input(format!(
+        "{part} is not finished: {} (the same command goes on; logs are in {root}/.logs)",
+        said.trim()
+    ))
 }
 
 fn join(folder: &TakeFolder) -> Result<(), TrainError> {
