@@ -21,12 +21,14 @@ pub struct Base {
 }
 
 impl Base {
-    /// The base that a configuration names, if it names one (`model.base`).
+    /// The base that a configuration names, if it names one (`model.base`). A relative path is one from the folder of the run, if
+    /// there is a folder: so a run's configuration, and the digest of it in its file, do not depend on where the folder lies.
     ///
     /// # Errors
     /// [`TrainError::Codec`] for a file that cannot be read; [`TrainError::Input`] for a scene that moves.
-    pub fn of(config: &Config) -> Result<Option<Self>, TrainError> {
-        config.model.base.as_deref().map(Self::open).transpose()
+    pub fn of(config: &Config, folder: Option<&RunFolder>) -> Result<Option<Self>, TrainError> {
+        let Some(path) = &config.model.base else { return Ok(None) };
+        Self::open(&folder.map_or_else(|| path.clone(), |folder| folder.root().join(path))).map(Some)
     }
 
     fn open(path: &Path) -> Result<Self, TrainError> {
@@ -71,7 +73,7 @@ impl Base {
 /// # Errors
 /// As [`Base::of`] and [`Base::without`]; [`TrainError::Data`] for a damaged list of hidden Gaussians.
 pub fn backdrop_of(config: &Config, folder: &RunFolder, device: &Device) -> Result<Option<Backdrop>, TrainError> {
-    let Some(base) = Base::of(config)? else { return Ok(None) };
+    let Some(base) = Base::of(config, Some(folder))? else { return Ok(None) };
     let hidden: Vec<u32> = folder.read_json(HIDDEN)?.unwrap_or_default();
     Ok(Some(Backdrop::new(&base.without(&hidden)?, device)))
 }

@@ -19,6 +19,8 @@ use crate::sampling::SamplerKind;
 /// Names the take's dataset, and has its plan.
 const RECORD: &str = "take.json";
 const CONFIG: &str = "config.toml";
+/// The file of the base, from the folder of a segment's run.
+const BASE_FROM_SEGMENT: &str = "../../base/scene.l4gs";
 /// Images of the base, about: enough to see every place several times, few enough to be read quickly.
 const BASE_IMAGES: usize = 300;
 const FEWEST_BASE_TIMES: usize = 24;
@@ -172,8 +174,7 @@ impl TakeFolder {
     /// The configuration of a segment.
     pub fn config_of_segment(&self, segment: &PlannedSegment) -> Config {
         let mut config = self.config.clone();
-        let base = self.base().join("scene.l4gs");
-        config.model.base = Some(std::path::absolute(&base).unwrap_or(base));
+        config.model.base = Some(BASE_FROM_SEGMENT.into());
         config.data.between = self.record.plan.between(segment);
         config
     }

@@ -22,6 +22,8 @@ use crate::stage::Stage;
 
 /// A pixel differs from the base from this mean absolute difference of a color on, of 1.
 const DIFFERS: f32 = 0.06;
+/// Differing pixels of a view for each point: densification adds what is missing.
+const PIXELS_A_POINT: usize = 4;
 /// Points drawn for each that is kept.
 const DRAWN: usize = 20;
 /// They lie between this share of the base's depth and all of it.
@@ -86,8 +88,9 @@ fn points(residuals: &[Residual<'_>], data: &Scene, count: usize, seed: u64) -> 
     let mut random = generator(seed, Purpose::GuidedSampling, Stage::Coarse, 0);
     let mut candidates: Vec<Candidate> = Vec::new();
     let by_time = by_time(residuals);
-    // As many draws as the differing area is worth: a small thing needs few Gaussians.
-    let draws = if differing.is_empty() { 0 } else { DRAWN * count.min(1 + differing.len() / 8) };
+    // As many as the differing area of a view is worth: small things need few Gaussians.
+    let count = count.min(differing.len() / (PIXELS_A_POINT * residuals.len().max(1))).max(LEAST);
+    let draws = if differing.is_empty() { 0 } else { DRAWN * count };
     for _ in 0..draws {
         let (view, pixel) = differing[random.random_range(0..differing.len())];
         let residual = &residuals[view];
@@ -107,7 +110,7 @@ fn points(residuals: &[Residual<'_>], data: &Scene, count: usize, seed: u64) -> 
         candidates.push(Candidate { place, color, share });
     }
     candidates.sort_by(|a, b| b.share.total_cmp(&a.share));
-    candidates.truncate(count.min(draws / DRAWN).max(LEAST.min(candidates.len())));
+    candidates.truncate(count);
     if candidates.len() < LEAST {
         // Nothing moves: some points of the scene, which will be pruned.
         let take = LEAST.min(data.points.len());

@@ -260,13 +260,11 @@ impl<F: DeformationField, E: EntropyModels> TrainerBuilder<F, E> {
     pub fn check(mut self) -> Result<(), TrainError> {
         self.folder = None;
         let device = self.open_device()?;
-        // Where a segment begins needs its images, and every start can be encoded.
-        Base::of(&self.config)?;
         self.first_state(&self.data.points, &device).map(|_| ())
     }
 
     fn begin(mut self, device: Device) -> Result<Trainer<F, E>, TrainError> {
-        let Some(base) = Base::of(&self.config)? else {
+        let Some(base) = Base::of(&self.config, self.folder.as_ref())? else {
             let state = self.first_state(&self.data.points, &device)?;
             return self.assemble(device, state, None, None);
         };

@@ -53,7 +53,7 @@ fn a_take_is_trained_in_parts_and_plays_as_one_file() {
     // The same command has nothing left to do; joining gives the same file.
     assert_success(&train(&w, "take", &[]).output().unwrap());
     assert_success(&w.command(["join", "take"]).output().unwrap());
-    assert_eq!(fs::read(&file).unwrap(), bytes);
+    assert!(fs::read(&file).unwrap() == bytes, "other bytes by the same command");
 
     let info: Value =
         serde_json::from_slice(&w.command(["info", "take/take.l4gs", "--json"]).output().unwrap().stdout).unwrap();
@@ -91,7 +91,7 @@ fn a_take_that_is_killed_ends_with_the_same_bytes() {
         }
     }
     assert!(kills > 3, "{kills} kills");
-    assert_eq!(fs::read(w.path("killed/take.l4gs")).unwrap(), expected, "after {kills} kills");
+    assert!(fs::read(w.path("killed/take.l4gs")).unwrap() == expected, "other bytes after {kills} kills");
 }
 
 #[test]
