@@ -3,7 +3,7 @@ import { Controls } from "./views/controls.js";
 import { SplatRenderer } from "./drawing/splat_renderer.js";
 export type DatasetCamera = import("./views/camera.js").DatasetCamera;
 export type Vector = import("./views/camera.js").Vector;
-export type Scene = import("./scene/scene.js").Scene;
+export type Playable = import("./scene/playable.js").Playable;
 export type View = import("./drawing/splat_renderer.js").View;
 export type PlayerOptions = {
     /**
@@ -41,16 +41,18 @@ export type PlayerOptions = {
     pixelRatio?: number;
 };
 /**
- * Plays a {@link Scene} on a canvas. Events: `timechange`, `statechange` (playing, loop, speed), `camerachange`, `error`.
+ * Plays a scene or a take on a canvas. Events: `timechange`, `statechange` (playing, loop, speed, waiting), `camerachange`, `error`.
  */
 export declare class Player extends EventTarget {
     #private;
     canvas: HTMLCanvasElement;
-    scene: import("./index.js").Scene;
+    scene: import("./scene/playable.js").Playable;
     cameras: import("./views/camera.js").DatasetCamera[];
     pixelRatio: number | undefined;
     loop: boolean;
     speed: number;
+    /** Whether time stands still until more of a take has come. */
+    waiting: boolean;
     /** Whether the camera goes along the training path while time runs. */
     following: boolean;
     /** Red, green, blue in [0, 1]. @type {number[]} */
@@ -70,10 +72,10 @@ export declare class Player extends EventTarget {
     controls: Controls | null;
     /**
      * @param {HTMLCanvasElement} canvas
-     * @param {Scene} scene
+     * @param {Playable} scene
      * @param {PlayerOptions} [options]
      */
-    constructor(canvas: HTMLCanvasElement, scene: Scene, options?: PlayerOptions);
+    constructor(canvas: HTMLCanvasElement, scene: Playable, options?: PlayerOptions);
     /** The current view. @returns {View} */
     get view(): View;
     /** Time in [0, 1]. */
@@ -99,7 +101,7 @@ export declare class Player extends EventTarget {
     /** The share of the canvas's pixels along each side that is drawn while something moves: 1 if there is time for all. */
     get draftScale(): number;
     /**
-     * The level of detail that is drawn while something moves, of {@link Scene.info}'s `levels`: 0 where there is time for all
+     * The level of detail that is drawn while something moves, of {@link Playable.info}'s `levels`: 0 where there is time for all
      * Gaussians, and half as many with each further one.
      */
     get draftLevel(): number;

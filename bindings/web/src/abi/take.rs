@@ -66,14 +66,14 @@ pub extern "C" fn unpack_segment(begin: f64) -> u32 {
     state.say(unpacked.map(|()| String::new()))
 }
 
-/// Opens the input, which [`unpack_segment`] has made. Returns 1 if [`text`](super::text) has the number of Gaussians and the
-/// degree of their harmonics; 0 if it has the error.
+/// Opens the input, which [`unpack_segment`] has made. Returns 1 if [`text`](super::text) has the number of Gaussians and
+/// that of their levels of detail; 0 if it has the error.
 #[cfg_attr(target_os = "unknown", unsafe(no_mangle))]
 pub extern "C" fn open_segment(begin: f64) -> u32 {
     let state = &mut *state();
     let input = std::mem::take(&mut state.input);
     let opened = state.opened_take().and_then(|take| take.open_segment(begin, &input));
-    state.say(opened.map(|(count, degree)| format!("{{\"count\":{count},\"shDegree\":{degree}}}")))
+    state.say(opened.map(|(count, levels)| format!("{{\"count\":{count},\"levels\":{levels}}}")))
 }
 
 /// Frees a segment.

@@ -83,17 +83,17 @@ impl OpenTake {
         Unpacked { scene, hidden: segment.hidden }.write()
     }
 
-    /// Opens a segment that was unpacked. Returns the number of its Gaussians and the degree of their harmonics.
+    /// Opens a segment that was unpacked. Returns the number of its Gaussians and of their levels of detail.
     ///
     /// # Errors
     /// No such segment, or bytes of something else.
-    pub fn open_segment(&mut self, begin: f64, unpacked: &[u8]) -> Result<(usize, u8), CodecError> {
+    pub fn open_segment(&mut self, begin: f64, unpacked: &[u8]) -> Result<(usize, u32), CodecError> {
         let (_, place) = self.find(begin)?;
         let Unpacked { scene, hidden } = Unpacked::read(unpacked)?;
-        let facts = (scene.gaussians.len(), scene.gaussians.sh_degree);
+        let count = scene.gaussians.len();
         self.close_segment(begin);
         self.segments.push(Segment { place, part: Part::new(scene)?, hidden });
-        Ok(facts)
+        Ok((count, levels(count)))
     }
 
     /// Frees a segment.
