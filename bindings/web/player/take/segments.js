@@ -165,6 +165,7 @@ export class Segments {
   async #decode(place) {
     const { begin } = place;
     const bytes = await this.#bytes.read(place);
+    if (this.#closed) return;
     this.#unpacker ??= this.#startUnpacker();
     const unpacker = await this.#unpacker;
     let answer;

@@ -82,10 +82,10 @@ export class Take extends Playable {
 
   /** @param {Uint8Array[]} ranges  those of the index */
   async #begin(ranges) {
-    this.segments.setIndex(this.#index, ranges, this.#file.length);
     const [begin, end] = this.#index.base;
     const bytes = await this.#file.read(begin, end);
-    // Where the first segment is right behind the base, the stream goes on with it.
+    // Only now: where the first segment is right behind the base, the stream goes on with it.
+    this.segments.setIndex(this.#index, ranges, this.#file.length);
     const segment = this.segments.with(0, async () => {});
     const { info, milliseconds } = await this.connection.ask({ type: "base", bytes }, [bytes.buffer]);
     await segment;

@@ -12,6 +12,7 @@ export declare class LocalFile {
      * A range of the file; less where the file ends before.
      * @param {number} begin @param {number} end
      * @returns {Promise<Uint8Array<ArrayBuffer>>}
+     * @throws {SceneError} `network`
      */
     read(begin: number, end: number): Promise<Uint8Array<ArrayBuffer>>;
     /** What else comes is not needed soon. */
