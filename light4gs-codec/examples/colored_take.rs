@@ -3,7 +3,7 @@
 //!
 //! A segment takes a second, and has one of six colors. The base has a large white ball in the middle, which all segments hide, and gray
 //! balls around it. So the middle of an image tells which segment is shown, and white says that none is. A last second has no segment. With SCENE the Gaussians of a
-//! segment and their motion are those of this file; without, they are a ball.
+//! segment and their motion are those of this file; without, they are balls in one place.
 
 use std::{path::Path, process::ExitCode};
 
@@ -20,6 +20,8 @@ const FPS: f32 = 30.0;
 const MARGIN: f64 = 0.25;
 /// Gray balls of the base.
 const RING: usize = 60;
+/// Balls that a segment has more than the one before, up to the fourth.
+const MORE: usize = 100;
 /// Slots of the index beyond those of the segments.
 const SPARE_SLOTS: u32 = 1;
 
@@ -71,7 +73,10 @@ fn base() -> Result<Vec<u8>, String> {
 fn segment(number: u16, scene: Option<&&str>) -> Result<NewSegment, String> {
     let color = COLORS[usize::from(number) % COLORS.len()];
     let scene = match scene {
-        None => SceneData { gaussians: balls([([0.0; 3], 0.25, color)]), ..SceneData::default() },
+        None => SceneData {
+            gaussians: balls(vec![([0.0; 3], 0.25, color); 1 + MORE * usize::from(number % 4)]),
+            ..SceneData::default()
+        },
         Some(file) => {
             let bytes = std::fs::read(file).map_err(|error| format!("{file}: {error}"))?;
             let mut scene = decode(&bytes).map_err(|error| format!("{file}: {error}"))?;
@@ -94,12 +99,12 @@ fn segment(number: u16, scene: Option<&&str>) -> Result<NewSegment, String> {
     Ok(NewSegment { times, stream, hidden })
 }
 
-/// Opaque balls: center, radius, color.
+/// Opaque balls: center, radius, color. They are not quite round: some renderers lose a round Gaussian in the middle of the view.
 fn balls(balls: impl IntoIterator<Item = ([f32; 3], f32, [f32; 3])>) -> GaussianArrays {
     let mut gaussians = GaussianArrays::default();
     for (mean, radius, color) in balls {
         gaussians.means.push(mean);
-        gaussians.log_scales.push([f32::ln(radius); 3]);
+        gaussians.log_scales.push([radius, 0.8 * radius, 0.9 * radius].map(f32::ln));
         gaussians.quats.push([1.0, 0.0, 0.0, 0.0]);
         gaussians.opacity_logits.push(6.0);
         gaussians.sh_dc.push(constant(color));

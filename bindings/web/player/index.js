@@ -12,10 +12,10 @@ export { SplatRenderer } from "./drawing/splat_renderer.js";
 export { baseColors } from "./scene/colors.js";
 
 // Types of arguments and results, for users of TypeScript.
-/** @typedef {import("./scene/playable.js").GaussiansAt} GaussiansAt */
-/** @typedef {import("./scene/playable.js").SceneInfo} SceneInfo */
-/** @typedef {import("./scene/playable.js").Viewpoint} Viewpoint */
-/** @typedef {import("./scene/playable.js").Frame} Frame */
+/** @typedef {import("./scene/scene.js").GaussiansAt} GaussiansAt */
+/** @typedef {import("./scene/scene.js").SceneInfo} SceneInfo */
+/** @typedef {import("./scene/scene.js").Viewpoint} Viewpoint */
+/** @typedef {import("./scene/scene.js").Frame} Frame */
 /** @typedef {import("./drawing/splat_renderer.js").View} View */
 /** @typedef {import("./views/camera.js").DatasetCamera} DatasetCamera */
 /** @typedef {import("./player.js").PlayerOptions} PlayerOptions */

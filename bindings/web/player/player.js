@@ -8,7 +8,7 @@ import { SplatRenderer } from "./drawing/splat_renderer.js";
 
 /** @typedef {import("./views/camera.js").DatasetCamera} DatasetCamera */
 /** @typedef {import("./views/camera.js").Vector} Vector */
-/** @typedef {import("./scene/playable.js").Playable} Playable */
+/** @typedef {import("./scene/scene.js").Scene} Scene */
 /** @typedef {import("./drawing/splat_renderer.js").View} View */
 
 /**
@@ -83,7 +83,7 @@ export class Player extends EventTarget {
 
   /**
    * @param {HTMLCanvasElement} canvas
-   * @param {Playable} scene
+   * @param {Scene} scene
    * @param {PlayerOptions} [options]
    */
   constructor(canvas, scene, options = {}) {
@@ -445,7 +445,7 @@ export class Player extends EventTarget {
   }
 
   /**
-   * The level of detail that is drawn while something moves, of {@link Playable.info}'s `levels`: 0 where there is time for all
+   * The level of detail that is drawn while something moves, of {@link Scene.info}'s `levels`: 0 where there is time for all
    * Gaussians, and half as many with each further one.
    */
   get draftLevel() {

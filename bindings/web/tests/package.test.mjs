@@ -7,7 +7,7 @@ import { tmpdir } from "node:os";
 import { after, before, describe, test } from "node:test";
 import { root } from "./harness.mjs";
 
-const source = `${root}/light4gs-web`;
+const source = `${root}/bindings/web`;
 const compiler = `${source}/node_modules/.bin/tsc`;
 const engines = `${source}/examples/node_modules`;
 const manifest = JSON.parse(readFileSync(`${source}/package.json`, "utf8"));

@@ -3,7 +3,7 @@ import { Controls } from "./views/controls.js";
 import { SplatRenderer } from "./drawing/splat_renderer.js";
 export type DatasetCamera = import("./views/camera.js").DatasetCamera;
 export type Vector = import("./views/camera.js").Vector;
-export type Playable = import("./scene/playable.js").Playable;
+export type Scene = import("./scene/scene.js").Scene;
 export type View = import("./drawing/splat_renderer.js").View;
 export type PlayerOptions = {
     /**
@@ -46,7 +46,7 @@ export type PlayerOptions = {
 export declare class Player extends EventTarget {
     #private;
     canvas: HTMLCanvasElement;
-    scene: import("./scene/playable.js").Playable;
+    scene: import("./index.js").Scene;
     cameras: import("./views/camera.js").DatasetCamera[];
     pixelRatio: number | undefined;
     loop: boolean;
@@ -72,10 +72,10 @@ export declare class Player extends EventTarget {
     controls: Controls | null;
     /**
      * @param {HTMLCanvasElement} canvas
-     * @param {Playable} scene
+     * @param {Scene} scene
      * @param {PlayerOptions} [options]
      */
-    constructor(canvas: HTMLCanvasElement, scene: Playable, options?: PlayerOptions);
+    constructor(canvas: HTMLCanvasElement, scene: Scene, options?: PlayerOptions);
     /** The current view. @returns {View} */
     get view(): View;
     /** Time in [0, 1]. */
@@ -101,7 +101,7 @@ export declare class Player extends EventTarget {
     /** The share of the canvas's pixels along each side that is drawn while something moves: 1 if there is time for all. */
     get draftScale(): number;
     /**
-     * The level of detail that is drawn while something moves, of {@link Playable.info}'s `levels`: 0 where there is time for all
+     * The level of detail that is drawn while something moves, of {@link Scene.info}'s `levels`: 0 where there is time for all
      * Gaussians, and half as many with each further one.
      */
     get draftLevel(): number;

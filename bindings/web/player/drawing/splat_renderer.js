@@ -92,7 +92,7 @@ export class SplatRenderer {
     return program;
   }
 
-  /** @param {Float32Array} list  what is drawn, as {@link import("../scene/playable.js").Playable.frame} gives it */
+  /** @param {Float32Array} list  what is drawn, as {@link import("../scene/scene.js").Scene.frame} gives it */
   setList(list) {
     const { gl, parts } = this;
     const rows = list.length / (ENTRY * ROW);

@@ -10,7 +10,7 @@ import { Player } from "../player.js";
 import { RemoteFile } from "../bytes/remote_file.js";
 import { MOST_TEXT, bytesOf, download } from "../bytes/sources.js";
 import { dismiss, load, prepare } from "../scene/load.js";
-import { Playable } from "../scene/playable.js";
+import { Scene } from "../scene/scene.js";
 import { Take } from "../take/take.js";
 import { shade } from "./time_line.js";
 import { watch } from "./watch.js";
@@ -125,7 +125,7 @@ export class L4gsPlayer extends (globalThis.HTMLElement ?? class {}) {
     const loading = ++this.#loading;
     const { signal } = this.#abort;
     const shown = this.player?.scene;
-    /** The scene, as soon as something of it can be seen. @type {Playable | null} */
+    /** The scene, as soon as something of it can be seen. @type {Scene | null} */
     let scene = null;
     let share = 0;
     const report = (/** @type {number} */ now) => {
@@ -182,7 +182,7 @@ export class L4gsPlayer extends (globalThis.HTMLElement ?? class {}) {
 
   /**
    * Shows a scene: a file, or one that was loaded.
-   * @param {import("../scene/load.js").Source | Playable} source
+   * @param {import("../scene/load.js").Source | Scene} source
    * @param {{ cameras?: DatasetCamera[], keep?: boolean }} [options]
    */
   async open(source, { cameras = [], keep = false } = {}) {
@@ -191,7 +191,7 @@ export class L4gsPlayer extends (globalThis.HTMLElement ?? class {}) {
     if (!before) this.layers.progress("Decoding");
     let scene;
     try {
-      scene = source instanceof Playable ? source : await load(source);
+      scene = source instanceof Scene ? source : await load(source);
       if (loading !== this.#loading) return scene.close();
       const still = matchMedia("(prefers-reduced-motion: reduce)").matches;
       const playing = before ? before.playing : this.hasAttribute("autoplay") && !still && scene.info.moves;

@@ -1,6 +1,6 @@
 // Colors for renderers that do not evaluate spherical harmonics.
 
-/** @typedef {import("./playable.js").GaussiansAt} GaussiansAt */
+/** @typedef {import("./scene.js").GaussiansAt} GaussiansAt */
 
 /** The constant basis function, `1 / (2 √π)`. */
 const DEGREE_0 = 0.2820948;

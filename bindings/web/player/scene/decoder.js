@@ -51,14 +51,14 @@ export class Decoder {
   /**
    * Decodes a file and returns its description.
    * @param {Uint8Array} bytes
-   * @returns {import("./playable.js").SceneInfo}
+   * @returns {import("./scene.js").SceneInfo}
    */
   open(bytes) {
     const info = this.#answer(() => {
       this.give(bytes);
       return this.wasm.open();
     });
-    return /** @type {import("./playable.js").SceneInfo} */ (info);
+    return /** @type {import("./scene.js").SceneInfo} */ (info);
   }
 
   /** Begins with a file that comes in pieces. The scene before stays until something of it can be seen. */
@@ -120,7 +120,7 @@ export class Decoder {
   /**
    * The description of a new scene, where there is one.
    * @param {() => number} ask  0 for an error, 1 for a new scene
-   * @returns {import("./playable.js").SceneInfo | null}
+   * @returns {import("./scene.js").SceneInfo | null}
    */
   #answer(ask) {
     const info = this.call(ask);
@@ -163,7 +163,7 @@ export class Decoder {
 
   /**
    * The list for drawing the last evaluation, see src/abi.
-   * @param {import("./playable.js").Viewpoint} viewpoint
+   * @param {import("./scene.js").Viewpoint} viewpoint
    * @param {ArrayBuffer | null} memory  to be used again
    */
   drawList({ row, eye, spread = Infinity }, memory) {

@@ -7,12 +7,14 @@ import { checkLength } from "../bytes/sources.js";
 import { MAGIC_BYTES, isTake } from "../take/magic.js";
 import { Take } from "../take/take.js";
 import { Connection } from "./connection.js";
-import { Scene } from "./scene.js";
+import { StreamScene } from "./stream_scene.js";
 
 /**
  * @typedef {ArrayBuffer | Uint8Array | Blob | ReadableStream<Uint8Array> | AsyncIterable<Uint8Array> | URL | RemoteFile} Source  a file: whole, as
  *   it comes, or its address, from which a take is loaded in parts
  */
+
+/** @typedef {import("./scene.js").Scene} Scene */
 
 /** A worker that waits for a file. @type {Connection | null} */
 let standby = null;
@@ -47,7 +49,7 @@ async function loadWhole(connection, blob) {
   const file = new LocalFile(blob);
   if (isTake(await file.read(0, MAGIC_BYTES))) return Take.open(connection, file);
   checkLength(blob instanceof File ? blob.name : "the file", blob.size);
-  const scene = new Scene(connection);
+  const scene = new StreamScene(connection);
   const bytes = await file.read(0, blob.size);
   await scene.open(bytes.buffer);
   return scene;
@@ -57,7 +59,7 @@ async function loadWhole(connection, blob) {
 async function loadArriving(connection, arriving, remote) {
   if (isTake(await arriving.read(0, MAGIC_BYTES))) return Take.open(connection, remote ?? arriving);
   remote?.checkLength();
-  const scene = new Scene(connection);
+  const scene = new StreamScene(connection);
   await scene.receive(arriving.pieces());
   return scene;
 }
@@ -66,7 +68,7 @@ async function loadArriving(connection, arriving, remote) {
  * Decodes a `.l4gs` file. A scene that comes as a stream is there as soon as something can be seen: {@link Scene.whole} says when
  * all of it is. A take is there with its base and its first segment.
  * @param {Source} source
- * @returns {Promise<Scene | Take>}
+ * @returns {Promise<Scene>}  a {@link Take}, where it is one
  * @throws {import("../errors.js").SceneError} whose `kind` says what is wrong with the file
  */
 export async function load(source) {

@@ -1,7 +1,7 @@
 // A take: a base that stands still, and segments in time that are loaded when they are needed.
 
 import { SceneError } from "../errors.js";
-import { Playable } from "../scene/playable.js";
+import { Scene } from "../scene/scene.js";
 import { readIndex } from "./read_index.js";
 import { placeAt } from "./plan.js";
 import { Segments } from "./segments.js";
@@ -41,7 +41,7 @@ const BEFORE_THE_END = 1 - 1e-9;
  * Events: `progress` (what is loaded has changed), `problem` (detail: the {@link SceneError} of a segment that cannot be shown; the rest
  * plays on), `change` (the take has grown).
  */
-export class Take extends Playable {
+export class Take extends Scene {
   /** The second that a player shows, while it waits for another one. */
   #held = 0;
   #file;
@@ -146,7 +146,7 @@ export class Take extends Playable {
   /**
    * Without its segment, where that cannot be had.
    * @param {number} seconds
-   * @param {import("../scene/playable.js").Viewpoint} viewpoint @param {ArrayBuffer | null} [memory] @param {number} [level]
+   * @param {import("../scene/scene.js").Viewpoint} viewpoint @param {ArrayBuffer | null} [memory] @param {number} [level]
    */
   frame(seconds, viewpoint, memory = null, level = 0) {
     return this.segments.with(seconds, async () => super.frame(seconds, viewpoint, memory, level));

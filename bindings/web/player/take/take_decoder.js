@@ -38,7 +38,7 @@ export class TakeDecoder {
   /**
    * Decodes the base.
    * @param {Uint8Array} bytes
-   * @returns {import("../scene/playable.js").SceneInfo}
+   * @returns {import("../scene/scene.js").SceneInfo}
    */
   base(bytes) {
     this.#decoder.forgetTimes();

@@ -15,7 +15,7 @@ const SAMPLES = 5000;
 
 /**
  * The lens of the source's default camera.
- * @param {import("../scene/playable.js").SceneInfo} info
+ * @param {import("../scene/scene.js").SceneInfo} info
  */
 export function sourceLens({ width, height, fovX }) {
   const [w, h] = width > 0 && height > 0 ? [width, height] : [800, 800];
@@ -26,7 +26,7 @@ export function sourceLens({ width, height, fovX }) {
 
 /**
  * Middle and radius of a scene, world units.
- * @param {Float32Array} list  as {@link import("../scene/playable.js").Playable.frame} gives it
+ * @param {Float32Array} list  as {@link import("../scene/scene.js").Scene.frame} gives it
  * @returns {{ middle: Vector, radius: number }}
  */
 function extent(list) {

@@ -65,7 +65,7 @@ export declare class SplatRenderer {
     constructor(canvas: HTMLCanvasElement | OffscreenCanvas);
     /** Makes everything again after the graphics card has lost it. */
     restore(): void;
-    /** @param {Float32Array} list  what is drawn, as {@link import("../scene/playable.js").Playable.frame} gives it */
+    /** @param {Float32Array} list  what is drawn, as {@link import("../scene/scene.js").Scene.frame} gives it */
     setList(list: Float32Array): void;
     /**
      * Draws the list that was set, over a background.

@@ -1,6 +1,6 @@
 import { Layers } from "./layers.js";
 import { Player } from "../player.js";
-import { Playable } from "../scene/playable.js";
+import { Scene } from "../scene/scene.js";
 export type DatasetCamera = import("../views/camera.js").DatasetCamera;
 declare const L4gsPlayer_base: {
     new (): HTMLElement;
@@ -40,10 +40,10 @@ export declare class L4gsPlayer extends L4gsPlayer_base {
     }): Promise<boolean>;
     /**
      * Shows a scene: a file, or one that was loaded.
-     * @param {import("../scene/load.js").Source | Playable} source
+     * @param {import("../scene/load.js").Source | Scene} source
      * @param {{ cameras?: DatasetCamera[], keep?: boolean }} [options]
      */
-    open(source: import("../scene/load.js").Source | Playable, { cameras, keep }?: {
+    open(source: import("../scene/load.js").Source | Scene, { cameras, keep }?: {
         cameras?: DatasetCamera[];
         keep?: boolean;
     }): Promise<void>;

@@ -1,4 +1,4 @@
-export type GaussiansAt = import("./playable.js").GaussiansAt;
+export type GaussiansAt = import("./scene.js").GaussiansAt;
 /**
  * The part of the colors that is the same from everywhere, and the opacities: `max(0, 0.5 + 0.2820948 · sh[i, 0])`.
  * @param {GaussiansAt} gaussians

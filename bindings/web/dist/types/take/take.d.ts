@@ -1,4 +1,4 @@
-import { Playable } from "../scene/playable.js";
+import { Scene } from "../scene/scene.js";
 import { Segments } from "./segments.js";
 export type Place = import("./plan.js").Place;
 export type Connection = import("../scene/connection.js").Connection;
@@ -57,7 +57,7 @@ export type RangedFile = {
  * Events: `progress` (what is loaded has changed), `problem` (detail: the {@link SceneError} of a segment that cannot be shown; the rest
  * plays on), `change` (the take has grown).
  */
-export declare class Take extends Playable {
+export declare class Take extends Scene {
     #private;
     segments: Segments;
     /**
@@ -85,13 +85,13 @@ export declare class Take extends Playable {
      * @param {number} seconds
      * @throws {SceneError} where the segment cannot be had
      */
-    gaussiansAt(seconds: number): Promise<import("../scene/playable.js").GaussiansAt>;
+    gaussiansAt(seconds: number): Promise<import("../scene/scene.js").GaussiansAt>;
     /**
      * Without its segment, where that cannot be had.
      * @param {number} seconds
-     * @param {import("../scene/playable.js").Viewpoint} viewpoint @param {ArrayBuffer | null} [memory] @param {number} [level]
+     * @param {import("../scene/scene.js").Viewpoint} viewpoint @param {ArrayBuffer | null} [memory] @param {number} [level]
      */
-    frame(seconds: number, viewpoint: import("../scene/playable.js").Viewpoint, memory?: ArrayBuffer | null, level?: number): Promise<import("../scene/playable.js").Frame>;
+    frame(seconds: number, viewpoint: import("../scene/scene.js").Viewpoint, memory?: ArrayBuffer | null, level?: number): Promise<import("../scene/scene.js").Frame>;
     /** While a segment is on its way, what was shown before stays. @param {number} share */
     momentAt(share: number): number;
     /** @param {number} share @param {boolean} loop */
