@@ -2,13 +2,13 @@
 //! [SCENE].
 //!
 //! A segment takes a second, and has one of six colors. The base has a large white ball in the middle, which all segments hide, and gray
-//! balls around it. So the middle of an image tells which segment is shown, and white says that none is. A last second has no segment. With SCENE the Gaussians of a
-//! segment and their motion are those of this file; without, they are balls in one place.
+//! balls around it. So the middle of an image tells which segment is shown, and white says that none is. A last second has no segment. With SCENE each
+//! segment is this stream, and has no color of its own; without, it is some balls in one place.
 
 use std::{path::Path, process::ExitCode};
 
 use light4gs_codec::{
-    GaussianArrays, SceneData, SceneMeta, decode, encode, info,
+    GaussianArrays, SceneData, SceneMeta, encode, info,
     take::{NewSegment, SegmentTimes, Take, TakeFile, TakeMeta, write_take},
 };
 
@@ -72,18 +72,12 @@ fn base() -> Result<Vec<u8>, String> {
 
 fn segment(number: u16, scene: Option<&&str>) -> Result<NewSegment, String> {
     let color = COLORS[usize::from(number) % COLORS.len()];
-    let scene = match scene {
-        None => SceneData {
-            gaussians: balls(vec![([0.0; 3], 0.25, color); 1 + MORE * usize::from(number % 4)]),
-            ..SceneData::default()
-        },
-        Some(file) => {
-            let bytes = std::fs::read(file).map_err(|error| format!("{file}: {error}"))?;
-            let mut scene = decode(&bytes).map_err(|error| format!("{file}: {error}"))?;
-            scene.gaussians.sh_dc.fill(constant(color));
-            scene.gaussians.sh_rest.fill(0.0);
-            scene
+    let stream = match scene {
+        None => {
+            let gaussians = balls(vec![([0.0; 3], 0.25, color); 1 + MORE * usize::from(number % 4)]);
+            encode(&SceneData { gaussians, ..SceneData::default() }).map_err(|error| error.to_string())?
         }
+        Some(file) => std::fs::read(file).map_err(|error| format!("{file}: {error}"))?,
     };
     let begin = f64::from(number);
     let times = SegmentTimes {
@@ -95,7 +89,6 @@ fn segment(number: u16, scene: Option<&&str>) -> Result<NewSegment, String> {
     };
     let hidden =
         (0..info(&base()?).map_err(|error| error.to_string())?.gaussian_count).map(|index| index == 0).collect();
-    let stream = encode(&scene).map_err(|error| error.to_string())?;
     Ok(NewSegment { times, stream, hidden })
 }
 

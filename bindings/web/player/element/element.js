@@ -258,12 +258,7 @@ export class L4gsPlayer extends (globalThis.HTMLElement ?? class {}) {
     player.addEventListener("statechange", this.#showState);
     player.addEventListener("camerachange", this.#showCamera);
     player.addEventListener("error", (event) => this.#fail(/** @type {CustomEvent} */ (event).detail));
-    player.scene.addEventListener("progress", this.#showParts);
-    player.scene.addEventListener("change", this.#showParts);
-    player.scene.addEventListener("problem", (event) => {
-      this.#problem = `Cannot be shown: ${/** @type {CustomEvent} */ (event).detail.message}`;
-      this.#say(this.#status);
-    });
+    for (const event of ["progress", "change"]) player.scene.addEventListener(event, this.#showParts);
     // A step of a key is a frame, where that is less.
     this.find("time").step = String(Math.min(0.001, 1 / info.frameCount));
     this.#showParts();
@@ -277,7 +272,10 @@ export class L4gsPlayer extends (globalThis.HTMLElement ?? class {}) {
   #showParts = () => {
     if (!this.player) return;
     const { scene } = this.player;
-    shade(this.find("time"), scene instanceof Take ? scene.loaded : [], scene.duration);
+    const { loaded, problems } = scene instanceof Take ? scene : { loaded: [], problems: [] };
+    shade(this.find("time"), loaded, scene.duration);
+    this.#problem = problems.length > 0 ? `Cannot be shown: ${problems[problems.length - 1].message}` : "";
+    this.#say(this.#status);
     this.#showTime();
   };
 

@@ -82,11 +82,6 @@ export class LoadedBytes {
     }
   }
 
-  /** @param {(place: Place) => boolean} isGone */
-  forget(isGone) {
-    for (const place of [...this.#kept.keys()]) if (isGone(place)) this.#kept.delete(place);
-  }
-
   /** Nothing more is loaded. */
   close() {
     this.#loading?.abort.abort();

@@ -3,7 +3,8 @@
 /**
  * @param {import("../scene/connection.js").Connection} connection
  * @param {import("./take.js").RangedFile} file
- * @returns {Promise<{ index: import("./take.js").Index, ranges: Uint8Array[] }>}  and the ranges, for another decoder
+ * @returns {Promise<{ index: import("./take.js").Index, ranges: Uint8Array[] } | null>}  and the ranges, for another decoder; null where it is the
+ *   index of another file than before
  * @throws {import("../errors.js").SceneError}
  */
 export async function readIndex(connection, file) {
@@ -11,7 +12,7 @@ export async function readIndex(connection, file) {
   const ranges = [];
   for (;;) {
     const { needed, index } = await connection.ask({ type: "index", ranges, length: lengthOf(file) });
-    if (index) return { index, ranges };
+    if (!needed) return index && { index, ranges };
     ranges.push(await file.read(needed[0], needed[1]));
   }
 }

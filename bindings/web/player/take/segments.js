@@ -54,7 +54,7 @@ export class Segments {
   }
 
   /**
-   * Takes an index. What was loaded and decoded stays, where it is still there.
+   * Takes an index, which has all that the one before had.
    * @param {import("./take.js").Index} index @param {Uint8Array[]} ranges  from which it was read @param {number} length  of the file
    */
   setIndex({ segments }, ranges, length) {
@@ -63,9 +63,6 @@ export class Segments {
       const place = { begin, end, first, last, checksum };
       return before.get(JSON.stringify(place)) ?? place;
     });
-    const here = new Set(this.places);
-    for (const [begin, { place }] of this.decoded) if (!here.has(place)) this.decoded.delete(begin);
-    this.#bytes.forget((place) => !here.has(place));
     // They may be well now.
     this.failed.clear();
     this.#indexRequest = { type: "index", ranges, length: lengthOf({ length }) };
@@ -181,7 +178,6 @@ export class Segments {
     if (this.#closed || !this.#plan().keep.includes(place)) return;
     this.#forgetOthers();
     const { count, levels } = await this.#connection.ask({ type: "segment", begin, unpacked }, [unpacked.buffer]);
-    if (!this.places.includes(place)) return;
     this.decoded.set(begin, { place, count, levels });
     this.#take.decodeMs = milliseconds;
   }
@@ -223,8 +219,7 @@ export class Segments {
   #progress() {
     if (this.#closed) return;
     for (const { place, resolve } of this.#needed) {
-      // What a grown take does not have any more does not come.
-      if (this.decoded.has(place.begin) || this.failed.has(place.begin) || !this.places.includes(place)) resolve();
+      if (this.decoded.has(place.begin) || this.failed.has(place.begin)) resolve();
     }
     this.#take.dispatchEvent(new Event("progress"));
     this.#advance();

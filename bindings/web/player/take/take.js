@@ -69,10 +69,12 @@ export class Take extends Scene {
    */
   static async open(connection, file) {
     await connection.prepared;
-    const { index, ranges } = await readIndex(connection, file);
-    const take = new Take(connection, file, index);
+    const front = await readIndex(connection, file);
+    // A decoder without a take takes any.
+    if (!front) throw new SceneError("fault", "the decoder has another take");
+    const take = new Take(connection, file, front.index);
     try {
-      await take.#begin(ranges);
+      await take.#begin(front.ranges);
       return take;
     } catch (error) {
       take.close();
@@ -84,11 +86,20 @@ export class Take extends Scene {
   async #begin(ranges) {
     const [begin, end] = this.#index.base;
     const bytes = await this.#file.read(begin, end);
-    // Only now: where the first segment is right behind the base, the stream goes on with it.
+    // Only now: where the first segment is right behind the base, the stream goes on with it, and ends there.
+    const cut = () => {
+      if (this.segments.loaded.length === 0) return;
+      this.#file.pause();
+      this.removeEventListener("progress", cut);
+    };
+    this.addEventListener("progress", cut);
     this.segments.setIndex(this.#index, ranges, this.#file.length);
     const segment = this.segments.with(0, async () => {});
+    // A base that is refused ends both.
+    segment.catch(() => {});
     const { info, milliseconds } = await this.connection.ask({ type: "base", bytes }, [bytes.buffer]);
     await segment;
+    this.removeEventListener("progress", cut);
     this.#file.pause();
     this.segments.ahead = true;
     this.decodeMs += milliseconds;
@@ -124,6 +135,11 @@ export class Take extends Scene {
   /** Number of Gaussians of the base and, where it is decoded, of the segment that is shown. */
   get count() {
     return this.info.count + (this.segments.decoded.get(placeAt(this.segments.places, this.#held)?.begin ?? NaN)?.count ?? 0);
+  }
+
+  /** What is wrong with segments that cannot be shown, the newest last. */
+  get problems() {
+    return [...this.segments.failed.values()];
   }
 
   /** Which parts of the take can be shown at once: first and last second of each. @returns {[number, number][]} */
@@ -181,7 +197,8 @@ export class Take extends Scene {
 
   /**
    * Looks whether the file has grown.
-   * @returns {Promise<boolean>}  false where it is another file, with another base; where it cannot be read, nothing changes
+   * @returns {Promise<boolean>}  false where it is another file: something that was there is not there any more
+   * @throws {SceneError} where it cannot be read now; nothing changes then
    */
   refresh() {
     this.#refreshing ??= this.#refresh().finally(() => (this.#refreshing = null));
@@ -192,11 +209,12 @@ export class Take extends Scene {
     const file = this.#file.again();
     if (!file) return true;
     try {
-      const { index, ranges } = await readIndex(this.connection, file);
-      if (JSON.stringify(index.base) !== JSON.stringify(this.#index.base)) {
+      const front = await readIndex(this.connection, file);
+      if (!front) {
         file.close();
         return false;
       }
+      const { index, ranges } = front;
       const before = this.#file;
       this.#file = file;
       this.#index = index;

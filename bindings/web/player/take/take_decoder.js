@@ -16,7 +16,7 @@ export class TakeDecoder {
    * Reads the index. It needs ranges of the file, one after the other.
    * @param {Uint8Array[]} ranges  those that it has needed so far
    * @param {number} length  bytes of the file; a very large number where they are not known
-   * @returns {{ needed: [number, number] } | { index: import("./take.js").Index }}
+   * @returns {{ needed: [number, number] } | { index: import("./take.js").Index | null }}  null where it is that of another file than before
    */
   index(ranges, length) {
     const { wasm } = this.#decoder;

@@ -28,22 +28,25 @@ pub extern "C" fn push_index() -> u32 {
     }
 }
 
-/// Takes the index, for a file of a length in bytes. What is decoded stays, where the index still has it. Returns 1 if
-/// [`text`](super::text) has the index; 0 if it has the error.
+/// Takes the index, for a file of a length in bytes. What is decoded stays. Returns 1 if [`text`](super::text) has the index; 2
+/// if it is not taken, since it is that of another file than before; 0 if there is an error.
 #[cfg_attr(target_os = "unknown", unsafe(no_mangle))]
 pub extern "C" fn finish_index(file_bytes: f64) -> u32 {
     let state = &mut *state();
     let reader = state.index.take().unwrap_or_else(|| IndexReader::new(&take_limits()));
-    let index = reader.finish(file_bytes as u64);
-    let description = index.map(|index| {
-        let description = describe_index(&index);
-        match &mut state.take {
-            Some(take) => take.set_index(index),
-            None => state.take = Some(OpenTake::new(index)),
+    let index = match reader.finish(file_bytes as u64) {
+        Ok(index) => index,
+        Err(error) => return state.say(Err(error)),
+    };
+    let description = describe_index(&index);
+    let taken = match &mut state.take {
+        Some(take) => take.grow(index),
+        none => {
+            *none = Some(OpenTake::new(index));
+            true
         }
-        description
-    });
-    state.say(description)
+    };
+    if taken { state.say(Ok(description)) } else { 2 }
 }
 
 /// Decodes the input as the base. Returns 1 if [`text`](super::text) has its description; 0 if it has the error.

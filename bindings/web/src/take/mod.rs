@@ -6,7 +6,7 @@ mod description;
 mod unpacked;
 
 use light4gs_codec::take::{SegmentPlace, TakeIndex, drawn_together};
-use light4gs_codec::{CodecError, Limits, SceneData, decode_with_limits, info_with_limits};
+use light4gs_codec::{CodecError, Decoded, Limits, OpenStream, SceneData, decode_with_limits};
 
 use self::unpacked::Unpacked;
 use crate::description::{Facts, describe};
@@ -44,15 +44,20 @@ impl OpenTake {
         Self { index, base: None, segments: Vec::new(), shown: None, list: DrawList::default() }
     }
 
-    /// Takes the index of a file that has grown. Segments that it does not name any more are forgotten, and the base is where
-    /// it begins or ends elsewhere.
-    pub fn set_index(&mut self, index: TakeIndex) {
-        if (index.base(), index.base_gaussians()) != (self.index.base(), self.index.base_gaussians()) {
-            self.base = None;
+    /// Takes the index of a file that may have grown: all that was there is still there. Another index is not taken. Returns
+    /// whether it was.
+    pub fn grow(&mut self, index: TakeIndex) -> bool {
+        let begin_of = |place: &SegmentPlace| place.times.begin;
+        let is_there = |place: &SegmentPlace| {
+            let found = index.segments().binary_search_by(|other| begin_of(other).total_cmp(&begin_of(place)));
+            found.is_ok_and(|number| index.segments()[number] == *place)
+        };
+        let same_base = (index.base(), index.base_gaussians()) == (self.index.base(), self.index.base_gaussians());
+        let grown = same_base && self.index.segments().iter().all(is_there);
+        if grown {
+            self.index = index;
         }
-        self.segments.retain(|segment| index.segments().contains(&segment.place));
-        self.shown = None;
-        self.index = index;
+        grown
     }
 
     /// Decodes the base, and returns what its stream says as JSON.
@@ -61,8 +66,8 @@ impl OpenTake {
     /// A damaged stream, a base that moves, or another number of Gaussians than the index says.
     pub fn open_base(&mut self, stream: &[u8]) -> Result<String, CodecError> {
         self.base = None;
-        self.index.check_base(&info_with_limits(stream, &take_limits())?)?;
-        let scene = decode_with_limits(stream, &take_limits())?;
+        let Decoded { scene, info, .. } = OpenStream::with_limits(stream, &take_limits())?.decode()?;
+        self.index.check_base(&info)?;
         let facts = Facts { bytes: stream.len() as u64, layers: 1, shown: 1, sections: &[] };
         let description = describe(&scene, &facts, levels(scene.gaussians.len()));
         let mut base = Part::new(scene)?;
@@ -106,10 +111,10 @@ impl OpenTake {
     /// both. Returns whether something was chosen of which nothing is evaluated yet.
     pub fn show(&mut self, seconds: f64, level: u32) -> bool {
         self.shown = self.segments.iter().position(|segment| segment.place.times.contains(seconds));
-        if let Some(base) = &mut self.base {
-            if base.show_level(level) {
-                base.evaluate(0.0, 0, base.count());
-            }
+        if let Some(base) = &mut self.base
+            && base.show_level(level)
+        {
+            base.evaluate(0.0, 0, base.count());
         }
         self.shown.is_some_and(|shown| self.segments[shown].part.show_level(level))
     }

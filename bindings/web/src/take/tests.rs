@@ -74,18 +74,22 @@ fn each_time_has_its_segment_and_what_it_hides() {
 }
 
 #[test]
-fn a_segment_stays_where_the_take_grows() {
+fn a_segment_stays_where_the_take_grows_and_another_take_is_not_taken() {
     let file = take();
     let mut open = opened(&file, &[1]);
-    let mut index = file.0.index().clone();
-    open.set_index(index.clone());
-    assert_eq!(depths(&mut open, 2.5).len(), 4);
-    // A take of the same base without that segment.
-    let bytes = write_take(&TakeMeta::default(), &balls(&[5.0, 2.0]), &[segment(0.0, balls(&[4.0]), Vec::new())], 3);
-    index.clone_from(Take::read(bytes.expect("a take"), &take_limits()).expect("a take").index());
-    open.set_index(index);
-    assert_eq!(depths(&mut open, 2.5), [5.0, 2.0]);
-    assert!(open.unpack_segment(2.0, &[]).unwrap_err().to_string().contains("begin of a segment"));
+    let index_of = |segments: &[NewSegment]| {
+        let bytes = write_take(&TakeMeta::default(), &balls(&[5.0, 2.0]), segments, 4 - segments.len() as u32);
+        Take::read(bytes.expect("a take"), &take_limits()).expect("a take").index().clone()
+    };
+    let [first, second] =
+        [segment(0.0, balls(&[4.0]), vec![true, false]), segment(2.0, balls(&[6.0, 3.0]), Vec::new())];
+    let third = segment(1.0, balls(&[7.0]), Vec::new());
+    assert!(open.grow(index_of(&[first.clone(), second.clone(), third])));
+    assert_eq!((depths(&mut open, 2.5).len(), open.index.segments().len()), (4, 3));
+    assert!(!open.grow(index_of(std::slice::from_ref(&first))));
+    assert!(!open.grow(index_of(&[first, segment(2.0, balls(&[6.5, 3.0]), Vec::new())])));
+    assert_eq!((depths(&mut open, 2.5).len(), open.index.segments().len()), (4, 3));
+    assert!(open.unpack_segment(0.7, &[]).unwrap_err().to_string().contains("begin of a segment"));
 }
 
 #[test]

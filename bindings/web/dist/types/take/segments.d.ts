@@ -24,7 +24,7 @@ export declare class Segments {
     /** The same take, where it has grown. @param {import("./take.js").RangedFile} file */
     setFile(file: import("./take.js").RangedFile): void;
     /**
-     * Takes an index. What was loaded and decoded stays, where it is still there.
+     * Takes an index, which has all that the one before had.
      * @param {import("./take.js").Index} index @param {Uint8Array[]} ranges  from which it was read @param {number} length  of the file
      */
     setIndex({ segments }: import("./take.js").Index, ranges: Uint8Array[], length: number): void;

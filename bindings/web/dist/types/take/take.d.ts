@@ -1,3 +1,4 @@
+import { SceneError } from "../errors.js";
 import { Scene } from "../scene/scene.js";
 import { Segments } from "./segments.js";
 export type Place = import("./plan.js").Place;
@@ -78,6 +79,8 @@ export declare class Take extends Scene {
     get duration(): number;
     /** Number of Gaussians of the base and, where it is decoded, of the segment that is shown. */
     get count(): number;
+    /** What is wrong with segments that cannot be shown, the newest last. */
+    get problems(): SceneError[];
     /** Which parts of the take can be shown at once: first and last second of each. @returns {[number, number][]} */
     get loaded(): [number, number][];
     /**
@@ -102,7 +105,8 @@ export declare class Take extends Scene {
     ready(share: number): Promise<void>;
     /**
      * Looks whether the file has grown.
-     * @returns {Promise<boolean>}  false where it is another file, with another base; where it cannot be read, nothing changes
+     * @returns {Promise<boolean>}  false where it is another file: something that was there is not there any more
+     * @throws {SceneError} where it cannot be read now; nothing changes then
      */
     refresh(): Promise<boolean>;
     close(): void;
