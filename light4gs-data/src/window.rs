@@ -53,8 +53,8 @@ impl Scene {
     }
 
     /// The scene with training frames at no more than `times` different times (at least 1), spread evenly over those that
-    /// they have: the first, the last, and those between. Of one time it is the middle. All cameras of a time stay, and so do the frames of
-    /// the other splits, extent and points.
+    /// they have: the first, the last, and those between. Of one time it is the middle. All cameras of a time stay, and
+    /// so do the frames of the other splits, extent and points.
     pub fn thinned(&self, times: usize) -> Self {
         let all = different(self.train.iter().map(|frame| frame.time));
         let (wanted, last) = (times.clamp(1, all.len().max(1)), all.len().saturating_sub(1));

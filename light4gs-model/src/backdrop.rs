@@ -70,10 +70,7 @@ impl Backdrop {
             scales: pair.joined(own.scales, &still.scales),
             opacities: pair.joined(own.opacities, &still.opacities),
             sh_dc: pair.joined(own.sh_dc, &still.sh_dc),
-            sh_rest: pair.joined(
-                padded(own.sh_rest.narrow(1, 0, kept), rest),
-                &padded(still.sh_rest.clone(), rest),
-            ),
+            sh_rest: pair.joined(first_of(own.sh_rest, kept, rest), &first_of(still.sh_rest.clone(), rest, rest)),
         };
         let offsets = Tensor::zeros([self.len(), 2], &still.means.device());
         (all, pair.joined(screen_offsets, &offsets), (rest + 1).isqrt() - 1)
@@ -96,15 +93,18 @@ impl Pair {
     }
 }
 
-/// Coefficients `[N, K, 3]` with zeros up to `rest` of them.
-fn padded(coefficients: Tensor<3>, rest: usize) -> Tensor<3> {
+/// The first `kept` of coefficients `[N, K, 3]`, or all of fewer, with zeros up to `rest` of them.
+fn first_of(coefficients: Tensor<3>, kept: usize, rest: usize) -> Tensor<3> {
     let [count, own, channels] = coefficients.dims();
-    if own == rest {
+    let kept = kept.min(own);
+    if kept == rest && own == rest {
         return coefficients;
     }
-    let zeros = Tensor::zeros([count, rest - own, channels], &coefficients.device());
-    match own {
-        0 => zeros,
-        _ => Tensor::cat(vec![coefficients, zeros], 1),
+    let zeros = |number: usize| Tensor::zeros([count, number, channels], &coefficients.device());
+    // No back end has a part of length 0.
+    match (kept, rest - kept) {
+        (0, _) => zeros(rest),
+        (_, 0) => coefficients.narrow(1, 0, kept),
+        (_, more) => Tensor::cat(vec![coefficients.clone().narrow(1, 0, kept), zeros(more)], 1),
     }
 }

@@ -123,7 +123,10 @@ pub fn scene_meta(config: &Config, data: &Scene) -> SceneMeta {
         // A folder may have any name.
         name: legal_name(&data.name),
         frame_count: times.len() as u32,
-        fps: data.seconds.filter(|_| times.len() > 1).map_or(0.0, |seconds| ((times.len() - 1) as f64 / seconds) as f32),
+        fps: data
+            .seconds
+            .filter(|_| times.len() > 1)
+            .map_or(0.0, |seconds| ((times.len() - 1) as f64 / seconds) as f32),
         bounds,
         background: data.background,
         config_digest: config.digest(),

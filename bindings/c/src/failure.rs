@@ -55,7 +55,7 @@ impl From<CodecError> for Failure {
         let kind = error.kind();
         let status = match kind {
             "io" => L4gsStatus::File,
-            "not-l4gs" => L4gsStatus::NotL4gs,
+            "not-l4gs" | "is-take" => L4gsStatus::NotL4gs,
             "newer-version" | "unknown-section" | "unknown-kind" | "unknown-encoding" | "unknown-attribute" => {
                 L4gsStatus::Newer
             }

@@ -44,9 +44,11 @@ pub(crate) fn describe(scene: &SceneData, facts: &Facts<'_>, levels: u32) -> Str
 pub(crate) fn describe_error(error: &CodecError) -> String {
     let kind = match error {
         CodecError::NotL4gs { .. } => "not-l4gs",
-        CodecError::NewerVersion { .. } | CodecError::UnknownKind { .. } | CodecError::UnknownEncoding { .. } => {
-            "newer"
-        }
+        CodecError::NewerVersion { .. }
+        | CodecError::UnknownKind { .. }
+        | CodecError::UnknownEncoding { .. }
+        // This player plays streams only.
+        | CodecError::IsTake => "newer",
         CodecError::OverLimit { .. } => "too-large",
         _ => "damaged",
     };

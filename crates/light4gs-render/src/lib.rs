@@ -5,6 +5,7 @@
 //! | task | start with |
 //! |---|---|
 //! | draw a `.l4gs` file at any time | [`PlayableScene`] |
+//! | draw a take, a file of minutes | [`PlayableTake`] |
 //! | pass its Gaussians to gsplat, or to readers of PLY files | [`conventions`] |
 //! | draw Gaussians of your own | [`TileLists::build`], [`rasterize`], [`assemble`], in this order, on [`GaussianSlices`] and a [`View`] |
 //! | differentiate these images | then [`splat_backward`] |
@@ -53,14 +54,17 @@
 //! Between processors with and without AVX2 images differ in the last bits; the Gaussians of [`PlayableScene`] do not. The
 //! kernels take slices of fitting lengths and panic otherwise; [`PlayableScene`] bounds memory and refuses with an error.
 pub mod conventions;
+mod drawing;
 pub mod lanes;
 mod playable;
+mod playable_take;
 pub mod rotation;
 pub mod spherical_harmonics;
 mod splatting;
 mod view;
 
 pub use playable::PlayableScene;
+pub use playable_take::PlayableTake;
 pub use splatting::{
     CHANNELS, GaussianGradients, GaussianSlices, INVALID_RADIUS, SCORES, TileLists, TilePixels, assemble, rasterize,
     significance, splat_backward,

@@ -1,22 +1,12 @@
 //! A decoded file: the scene can be computed and drawn at any time.
 
-use light4gs_codec::rendering::{TILE, opacity, scale};
 use light4gs_codec::{
     CodecError, Decoded, FurtherAttribute, GaussianArrays, Limits, MotionEvaluator, MotionSource, OpenStream,
     SceneData, StreamInfo,
 };
 use light4gs_data::Camera;
 
-use crate::splatting::{CHANNELS, GaussianSlices, TileLists, assemble, rasterize};
-use crate::view::View;
-
-/// Most memory of a shown scene, and of an image that is drawn, as a multiple of [`Limits::memory_bytes`]. (Decoding
-/// takes at most one of these.)
-const SHARES: u64 = 8;
-
-/// Bytes of an intersection (a Gaussian in a tile): the tile twice, the Gaussian, its place, and twice the pixels that
-/// it hits, since a growing list may have twice the room that it needs.
-const PAIR_BYTES: u64 = 4 * 6;
+use crate::drawing::{Allowance, check_memory};
 
 /// A decoded file: the scene can be computed and drawn at any time.
 ///
@@ -38,9 +28,7 @@ pub struct PlayableScene {
     canonical: GaussianArrays,
     info: StreamInfo,
     evaluator: MotionEvaluator,
-    limits: Limits,
-    /// Most memory that showing may take, bytes.
-    memory_bytes: u64,
+    allowance: Allowance,
 }
 
 impl PlayableScene {
@@ -51,10 +39,10 @@ impl PlayableScene {
     /// more than eight times the memory of `limits`.
     pub fn decode(bytes: &[u8], limits: &Limits) -> Result<Self, CodecError> {
         let Decoded { scene, info, .. } = OpenStream::with_limits(bytes, limits)?.decode()?;
-        let memory_bytes = limits.memory_bytes.max(4 * bytes.len() as u64).saturating_mul(SHARES);
-        check_memory("memory of the motion", motion_bytes(&scene), memory_bytes)?;
+        let allowance = Allowance::of_stream(limits, bytes.len());
+        check_memory("memory of the motion", motion_bytes(&scene), allowance.memory_bytes)?;
         let evaluator = MotionEvaluator::new(&scene)?;
-        Ok(Self { canonical: scene.gaussians, info, evaluator, limits: *limits, memory_bytes })
+        Ok(Self { canonical: scene.gaussians, info, evaluator, allowance })
     }
 
     /// Decodes a file. Not in a browser, which has none.
@@ -111,49 +99,23 @@ impl PlayableScene {
     /// Another time; an image beyond [`Limits::image_side`] or [`Limits::image_pixels`]; an image that takes more than eight
     /// times [`Limits::memory_bytes`], because too many Gaussians cover too much of it.
     pub fn render(&self, camera: &Camera, time: f32, background: [f32; 3]) -> Result<Vec<f32>, CodecError> {
-        self.limits.check_image(camera.width, camera.height)?;
-        if camera.width == 0 || camera.height == 0 {
-            return Ok(Vec::new());
-        }
-        let view = View { camera: *camera, background, sh_degree: usize::from(self.canonical.sh_degree) };
-        let fixed = self.gaussian_bytes() + pixel_bytes(&view);
-        check_memory("memory of the image", fixed, self.memory_bytes)?;
-
-        let moved = self.at(time)?;
-        let scales: Vec<f32> = moved.log_scales.as_flattened().iter().map(|&log_scale| scale(log_scale)).collect();
-        let opacities: Vec<f32> = moved.opacity_logits.iter().map(|&logit| opacity(logit)).collect();
-        let gaussians = GaussianSlices {
-            means: moved.means.as_flattened(),
-            quats: moved.quats.as_flattened(),
-            scales: &scales,
-            opacities: &opacities,
-            sh_dc: moved.sh_dc.as_flattened(),
-            sh_rest: &moved.sh_rest,
-            screen_offsets: &vec![0.0; 2 * moved.len()],
-        };
-        let pairs = TileLists::most_pairs(&gaussians, &view);
-        check_memory("memory of the image", fixed.saturating_add(pairs.saturating_mul(PAIR_BYTES)), self.memory_bytes)?;
-        // They are counted in 32 bits.
-        check_memory("number of pairs of a tile and a Gaussian in it", pairs, u32::MAX.into())?;
-
-        let lists = TileLists::build(&gaussians, &view);
-        let mut image = assemble(&rasterize(&lists, &view), &view);
-        image.truncate(3 * camera.width as usize * camera.height as usize);
-        Ok(image)
+        self.allowance.image(camera, background, (self.len(), self.numbers()), || self.at(time))
     }
 
-    /// Bytes of the Gaussians while drawing: the moved ones, the activated ones, those on the screen.
-    fn gaussian_bytes(&self) -> u64 {
-        let attributes: usize = self.canonical.attributes().map(|attribute| attribute.width).sum();
-        self.len() as u64 * (4 * attributes as u64 + 4 * 6 + TileLists::BYTES_OF_A_GAUSSIAN)
+    /// Numbers of all Gaussians together.
+    pub(crate) fn numbers(&self) -> usize {
+        self.canonical.attributes().map(|attribute| attribute.values.len()).sum()
     }
-}
 
-/// Bytes of the tiles' and the image's pixels.
-fn pixel_bytes(view: &View) -> u64 {
-    let pixels = u64::from(view.camera.width) * u64::from(view.camera.height);
-    let in_tiles = (view.tiles_across() * view.tiles_down() * TILE * TILE) as u64;
-    4 * CHANNELS as u64 * (pixels + in_tiles)
+    /// The Gaussians as they are stored, for a scene in which nothing moves.
+    pub(crate) fn canonical(&self) -> &GaussianArrays {
+        &self.canonical
+    }
+
+    /// What showing it may take.
+    pub(crate) fn allowance(&self) -> Allowance {
+        self.allowance
+    }
 }
 
 /// Bytes of a [`MotionEvaluator`] for all Gaussians together. (For the planes it takes less than the scene.)
@@ -162,13 +124,6 @@ fn motion_bytes(scene: &SceneData) -> u64 {
         scene.motion.network.as_ref().is_some_and(|motion| motion.sources.contains(&MotionSource::Features));
     let features = if reads_features { scene.feature_planes.features() } else { 0 };
     (scene.gaussians.len() as u64).saturating_mul(features.saturating_mul(4).saturating_add(12))
-}
-
-fn check_memory(field: &str, found: u64, limit: u64) -> Result<(), CodecError> {
-    if found <= limit {
-        return Ok(());
-    }
-    Err(CodecError::OverLimit { section: "rendering", field: field.into(), found, limit })
 }
 
 #[cfg(test)]

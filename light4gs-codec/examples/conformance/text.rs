@@ -1,27 +1,83 @@
-//! The text that the conformance set compares: checksums of all arrays of a scene, a line each. See
+//! The text that the conformance set compares: checksums of all arrays of a scene or a take, a line each. See
 //! tests/conformance/README.md.
 
-use light4gs_codec::{CodecError, CoordinateMapping, GaussianArrays, MotionEvaluator, SceneData, decode};
+use light4gs_codec::{
+    CodecError, CoordinateMapping, GaussianArrays, Limits, MotionEvaluator, SceneData, decode, info,
+    take::{SegmentTimes, Take, TakeSegment, drawn_together, is_take},
+};
 
-/// The lines of a stream. Times are numbers as text; they stand in the lines as they are given.
+/// The lines of a stream or a take. Times are numbers as text; they stand in the lines as they are given. Those of a take are
+/// seconds.
 pub(crate) fn lines(bytes: &[u8], times: &[&str]) -> Result<Vec<String>, CodecError> {
+    if is_take(bytes) {
+        return take_lines(bytes, times);
+    }
     let scene = decode(bytes)?;
     let evaluator = MotionEvaluator::new(&scene)?;
     let mut lines = Vec::new();
-    for attribute in scene.gaussians.attributes() {
-        lines.push(line("scene", attribute.name, attribute.values));
-    }
-    lines.push(line("scene", "coordinates", &coordinates(&scene)));
-    let planes: Vec<f32> = scene.feature_planes.planes.iter().flat_map(|plane| plane.values.clone()).collect();
-    lines.push(line("scene", "planes", &planes));
-    lines.push(line("scene", "motion", &motion(&scene)));
+    scene_lines("scene", &scene, &mut lines);
     for time in times {
-        let mut moved = scene.gaussians.clone();
         let number = time.parse().expect("a time is a number");
-        evaluator.apply(&scene.gaussians, number, 0..moved.len(), &mut moved);
-        frame(time, &moved, &mut lines);
+        frame(time, &moved(&scene, &evaluator, number), &mut lines);
     }
     Ok(lines)
+}
+
+/// The times of the segments, the base, each segment, and what is drawn at each time.
+fn take_lines(bytes: &[u8], times: &[&str]) -> Result<Vec<String>, CodecError> {
+    let take = Take::read(bytes.to_vec(), &Limits::default())?;
+    let mut numbers = Vec::new();
+    for place in take.index().segments() {
+        let SegmentTimes { begin, end, stream_begin, stream_end, frames } = place.times;
+        numbers.extend([begin, end, stream_begin, stream_end].iter().flat_map(|time| time.to_le_bytes()));
+        numbers.extend(frames.to_le_bytes());
+    }
+    let mut lines = vec![format!("take times {:08x}", crc32c::crc32c(&numbers))];
+    let stream = take.base()?;
+    take.index().check_base(&info(&stream)?)?;
+    let base = decode(&stream)?;
+    MotionEvaluator::new(&base)?;
+    scene_lines("base", &base, &mut lines);
+    let mut segments = Vec::new();
+    for number in 0..take.len() {
+        let TakeSegment { times, stream, hidden } = take.segment(number)?;
+        let scene = decode(&stream)?;
+        let evaluator = MotionEvaluator::new(&scene)?;
+        let bits: Vec<u8> = hidden.iter().map(|&bit| bit.into()).collect();
+        lines.push(format!("segment-{number} hidden {:08x}", crc32c::crc32c(&bits)));
+        scene_lines(&format!("segment-{number}"), &scene, &mut lines);
+        segments.push((times, scene, evaluator, hidden));
+    }
+    for time in times {
+        let seconds = time.parse().expect("a time is a number");
+        let drawn = match take.segment_at(seconds) {
+            None => drawn_together(&base.gaussians, &[], None),
+            Some(number) => {
+                let (times, scene, evaluator, hidden) = &segments[number];
+                let moved = moved(scene, evaluator, times.stream_time(seconds));
+                drawn_together(&base.gaussians, hidden, Some(&moved))
+            }
+        };
+        frame(time, &drawn, &mut lines);
+    }
+    Ok(lines)
+}
+
+fn moved(scene: &SceneData, evaluator: &MotionEvaluator, time: f32) -> GaussianArrays {
+    let mut moved = scene.gaussians.clone();
+    evaluator.apply(&scene.gaussians, time, 0..moved.len(), &mut moved);
+    moved
+}
+
+/// The lines of a decoded stream, without times.
+fn scene_lines(what: &str, scene: &SceneData, lines: &mut Vec<String>) {
+    for attribute in scene.gaussians.attributes() {
+        lines.push(line(what, attribute.name, attribute.values));
+    }
+    lines.push(line(what, "coordinates", &coordinates(scene)));
+    let planes: Vec<f32> = scene.feature_planes.planes.iter().flat_map(|plane| plane.values.clone()).collect();
+    lines.push(line(what, "planes", &planes));
+    lines.push(line(what, "motion", &motion(scene)));
 }
 
 /// The lines of one time.

@@ -17,9 +17,10 @@ pub struct SegmentTimes {
     pub end: f64,
     /// What time 0 of the stream means; at most `begin`.
     pub stream_begin: f64,
-    /// What time 1 of the stream means; at least `end`.
+    /// What time 1 of the stream means; more than `begin`. Where it is before `end`, the last moment stays: the last frame of a take
+    /// is shown for as long as the others.
     pub stream_end: f64,
-    /// Number of frames from which the segment was trained, margins included; 0 where not known.
+    /// Number of frames that are shown; 0 where not known.
     pub frames: u32,
 }
 
@@ -58,9 +59,9 @@ impl SegmentTimes {
                 return Err(CodecError::invalid(SECTION, format!("{field} of a segment"), seconds, expected));
             }
         }
-        if !(0.0 <= begin && begin < end && stream_begin <= begin && end <= stream_end) {
+        if !(0.0 <= begin && begin < end && stream_begin <= begin && begin < stream_end) {
             let found = format!("{begin} to {end} s of a stream from {stream_begin} to {stream_end} s");
-            let expected = "0 or more to something later, within those of its stream";
+            let expected = "0 or more to something later, beginning within those of its stream";
             return Err(CodecError::invalid(SECTION, "times of a segment", found, expected));
         }
         at_most(SECTION, "frames of a segment", frames.into(), limits.frames)

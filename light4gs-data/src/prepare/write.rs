@@ -165,7 +165,7 @@ mod tests {
             camera: 1,
         };
         let intrinsics = Intrinsics { width: 8, height: 8, fx: 9.0, fy: 9.0, cx: 4.0, cy: 4.0 };
-        let model = Model {
+        let model = || Model {
             cameras: [(1, ModelCamera { intrinsics, lens: None })].into(),
             images: (1..5).map(image).collect(),
             points: PointCloud { positions: vec![[0.0; 3], [1.0; 3]], colors: vec![[0.5; 3]; 2] },
@@ -174,11 +174,22 @@ mod tests {
             images_file: out.join("images.bin"),
         };
         let options = PrepareOptions::new(vec![folder.path().join("a.mp4")], out.clone());
-        let summary = dataset(&options, &[String::new()], model, Vec::new()).unwrap();
+        let summary = dataset(&options, &[String::new()], model(), Vec::new()).unwrap();
         assert_eq!((summary.images, summary.registered, summary.frames, summary.cameras), (6, 4, 4, 1));
-        let text = std::fs::read_to_string(out.join("transforms.json")).unwrap();
-        let document: Value = serde_json::from_str(&text).unwrap();
-        let times = document["frames"].as_array().unwrap().iter().map(|frame| frame["time"].as_f64().unwrap());
-        assert!(times.zip([0.0, 1.0 / 3.0, 2.0 / 3.0, 1.0]).all(|(found, expected)| (found - expected).abs() < 1e-12));
+        let written = |expected: [f64; 4]| {
+            let text = std::fs::read_to_string(out.join("transforms.json")).unwrap();
+            let document: Value = serde_json::from_str(&text).unwrap();
+            let times = document["frames"].as_array().unwrap().iter().map(|frame| frame["time"].as_f64().unwrap());
+            assert!(times.zip(expected).all(|(found, expected)| (found - expected).abs() < 1e-12));
+            document["seconds"].as_f64()
+        };
+        assert_eq!(written([0.0, 1.0 / 3.0, 2.0 / 3.0, 1.0]), None);
+        // Times of presentation: those of frames with a pose are from 0.5 to 3 seconds.
+        let record = json!({
+            "video": "a.mp4", "content": {"length": 3, "hash": "0"}, "notes": [], "seconds": [0.0, 0.5, 1.0, 2.0, 3.0, 4.0],
+        });
+        std::fs::write(out.join("images/frames.json"), record.to_string()).unwrap();
+        dataset(&options, &[String::new()], model(), Vec::new()).unwrap();
+        assert_eq!(written([0.0, 0.2, 0.6, 1.0]), Some(2.5));
     }
 }

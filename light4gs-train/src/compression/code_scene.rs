@@ -13,7 +13,7 @@ use serde::{Deserialize, Serialize};
 
 use super::{
     AttributeRecord, BitEstimate, BitMap, Compression, CompressionOf, ConfiguredModels, EntropyModels, MissedQuality,
-    SearchImages, ShModel, encode, fit, mean_psnr, measured_views, splatter_of, plane_and_sh_step_search,
+    SearchImages, ShModel, encode, fit, mean_psnr, measured_views, plane_and_sh_step_search, splatter_of,
 };
 use crate::config::{CompressionConfig, Config, FileProfile};
 use crate::dataset::{ImageSource, scene_meta};

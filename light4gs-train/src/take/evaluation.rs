@@ -81,7 +81,7 @@ pub fn evaluate_take(
     images: &dyn ImageSource,
     device: &Device,
 ) -> Result<TakeEvaluation, TrainError> {
-    let index = take.index();
+    let index = take.take().index();
     let seconds = index.meta().seconds;
     let interval = if index.meta().fps > 0.0 { 1.0 / f64::from(index.meta().fps) } else { 1.0 / 30.0 };
     let joins: Vec<f64> = index.segments().iter().skip(1).map(|segment| segment.times.begin).collect();
@@ -151,9 +151,9 @@ impl Shown<'_> {
         let change = |to: u8, from: u8| f64::from(to) - f64::from(from);
         let rendered = next.render.pixels.iter().zip(&self.render.pixels);
         let real = next.truth.pixels.iter().zip(&self.truth.pixels);
-        let errors = rendered.zip(real).map(|((to, from), (real_to, real_from))| {
-            (change(*to, *from) - change(*real_to, *real_from)).powi(2)
-        });
+        let errors = rendered
+            .zip(real)
+            .map(|((to, from), (real_to, real_from))| (change(*to, *from) - change(*real_to, *real_from)).powi(2));
         (errors.sum::<f64>() / self.render.pixels.len().max(1) as f64).sqrt() / 255.0
     }
 }
@@ -161,8 +161,10 @@ impl Shown<'_> {
 /// The frames to measure, by camera and time.
 fn frames(data: &Scene) -> Vec<(Split, &Frame)> {
     let of = |split: Split| data.frames(split).iter().map(move |frame| (split, frame));
-    let is_rig = data.test.first().is_some_and(|first| data.train.iter().all(|frame| frame.camera_id != first.camera_id));
-    let mut frames: Vec<_> = if is_rig { of(Split::Test).collect() } else { of(Split::Test).chain(of(Split::Train)).collect() };
+    let is_rig =
+        data.test.first().is_some_and(|first| data.train.iter().all(|frame| frame.camera_id != first.camera_id));
+    let mut frames: Vec<_> =
+        if is_rig { of(Split::Test).collect() } else { of(Split::Test).chain(of(Split::Train)).collect() };
     frames.sort_by(|(_, a), (_, b)| a.camera_id.cmp(&b.camera_id).then(a.time.total_cmp(&b.time)));
     frames
 }

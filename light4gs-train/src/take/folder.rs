@@ -1,5 +1,6 @@
 //! The folder of a take in training: a run for the base, a run for each segment, and the file that they give.
 
+use std::io::Write;
 use std::path::{Path, PathBuf};
 
 use light4gs_codec::take::{NewSegment, TakeMeta, write_take};
@@ -46,7 +47,13 @@ impl TakeFolder {
     ///
     /// # Errors
     /// [`TrainError::Input`] for a folder that holds something else; [`TrainError::Data`] for one that cannot be written.
-    pub fn create(root: &Path, scene: &Path, data: &Scene, plan: TakePlan, config: &Config) -> Result<Self, TrainError> {
+    pub fn create(
+        root: &Path,
+        scene: &Path,
+        data: &Scene,
+        plan: TakePlan,
+        config: &Config,
+    ) -> Result<Self, TrainError> {
         let cameras = (data.train.len() / plan.frames.max(1)).max(1);
         let record = TakeRecord {
             scene: std::path::absolute(scene).map_err(DataError::io("find", scene))?,
@@ -69,9 +76,34 @@ impl TakeFolder {
         }
         std::fs::create_dir_all(root).map_err(DataError::io("create", root))?;
         write_atomically(&root.join(CONFIG), |file| file.write_all(config.to_toml().as_bytes()))?;
-        let text = serde_json::to_string_pretty(&folder.record).expect("plain data has a JSON form");
-        write_atomically(&root.join(RECORD), |file| writeln!(file, "{text}"))?;
+        folder.write_record()?;
         Ok(folder)
+    }
+
+    fn write_record(&self) -> Result<(), TrainError> {
+        let text = serde_json::to_string_pretty(&self.record).expect("plain data has a JSON form");
+        Ok(write_atomically(&self.root.join(RECORD), |file| writeln!(file, "{text}"))?)
+    }
+
+    /// Takes in the frames that a longer take has after those of this one: its base and its segments stay as they are.
+    ///
+    /// # Errors
+    /// [`TrainError::Input`] where a segment is not trained yet, and as [`TakePlan::extended`].
+    pub fn extend(&mut self, scene: &Path, data: &Scene, seconds: f64) -> Result<(), TrainError> {
+        let scene = std::path::absolute(scene).map_err(DataError::io("find", scene))?;
+        if scene == self.record.scene && self.record.plan.has_all_of(data) {
+            // An extension that was stopped goes on.
+            return Ok(());
+        }
+        if let Some(number) = (0..self.record.plan.segments.len()).find(|number| !self.is_trained(*number)) {
+            let root = self.root.display();
+            return Err(TrainError::Input(format!(
+                "segment {number} of {root} is not trained yet; finish it first, with the `train` command that began the take"
+            )));
+        }
+        self.record.plan = self.record.plan.extended(data, seconds)?;
+        self.record.scene = scene;
+        self.write_record()
     }
 
     /// Opens the folder of a take.

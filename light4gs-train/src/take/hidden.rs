@@ -60,5 +60,10 @@ fn blamed(gaussians: &GaussianTensors, residual: &Residual<'_>, device: &Device)
     let gradients = (image * weights).sum().backward();
     let Some(gradient) = colors.grad(&gradients) else { return vec![[0.0; 2]; count] };
     let numbers: Vec<f32> = gradient.into_data().iter().collect();
-    numbers.as_chunks::<3>().0.iter().map(|[error, weight, _]| [*error, *weight].map(|sum| f64::from(sum / SH_C0))).collect()
+    numbers
+        .as_chunks::<3>()
+        .0
+        .iter()
+        .map(|[error, weight, _]| [*error, *weight].map(|sum| f64::from(sum / SH_C0)))
+        .collect()
 }

@@ -1,5 +1,7 @@
 //! The segments of a take: which frames each of them shows and is trained on.
 
+use std::collections::BTreeSet;
+
 use light4gs_codec::take::SegmentTimes;
 use light4gs_data::Scene;
 use serde::{Deserialize, Serialize};
@@ -24,6 +26,21 @@ pub struct PlannedSegment {
     pub trained_frames: usize,
 }
 
+impl PlannedSegment {
+    /// Shows the frames from `first` to before `end` of a take of `frames` frames.
+    fn showing(first: usize, end: usize, frames: usize) -> Self {
+        let trained_first = first.saturating_sub(MARGIN);
+        let trained_end = (end + MARGIN).min(frames);
+        Self { first, frames: end - first, trained_first, trained_frames: trained_end - trained_first }
+    }
+}
+
+/// The number of times that images of a scene have.
+fn times(data: &Scene) -> usize {
+    let frames = data.train.iter().chain(&data.test);
+    frames.map(|frame| frame.time.to_bits()).collect::<BTreeSet<_>>().len()
+}
+
 /// How a take is divided.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct TakePlan {
@@ -41,10 +58,33 @@ impl TakePlan {
     /// # Errors
     /// [`TrainError::Input`] where a segment would have fewer than four frames, or the take has fewer.
     pub fn of(data: &Scene, seconds: f64, segment: f64) -> Result<Self, TrainError> {
-        let mut times: Vec<u32> = data.train.iter().chain(&data.test).map(|frame| frame.time.to_bits()).collect();
-        times.sort_unstable();
-        times.dedup();
-        Self::new(times.len(), seconds, segment)
+        Self::new(times(data), seconds, segment)
+    }
+
+    /// The plan of a longer take that begins with this one: its segments stay, and further ones of about their length follow.
+    ///
+    /// # Errors
+    /// [`TrainError::Input`] for a take with no more frames, or with another interval between them.
+    pub fn extended(&self, data: &Scene, seconds: f64) -> Result<Self, TrainError> {
+        let frames = times(data);
+        let longer = Self { frames, seconds, segments: self.segments.clone() };
+        let changed = (longer.interval() / self.interval() - 1.0).abs() > 1e-3;
+        if frames <= self.frames || changed {
+            return Err(TrainError::Input(format!(
+                "{} has {frames} frames in {seconds:.2} seconds, expected the take of {} frames in {:.2} seconds with more frames \
+                 after them, at the same rate",
+                data.root.display(),
+                self.frames,
+                self.seconds
+            )));
+        }
+        let length = self.seconds / self.segments.len() as f64;
+        let more = frames - self.frames;
+        let added = more as f64 * longer.interval();
+        let count = ((added / length).round() as usize).clamp(1, (more / FEWEST).max(1));
+        let begin = |number: usize| self.frames + number * more / count;
+        let further = (0..count).map(|number| PlannedSegment::showing(begin(number), begin(number + 1), frames));
+        Ok(Self { segments: self.segments.iter().copied().chain(further).collect(), ..longer })
     }
 
     fn new(frames: usize, seconds: f64, segment: f64) -> Result<Self, TrainError> {
@@ -57,18 +97,13 @@ impl TakePlan {
             )));
         }
         let begin = |number: usize| number * frames / count;
-        let segments = (0..count).map(|number| {
-            let (first, end) = (begin(number), begin(number + 1));
-            let trained_first = first.saturating_sub(MARGIN);
-            let trained_end = (end + MARGIN).min(frames);
-            PlannedSegment {
-                first,
-                frames: end - first,
-                trained_first,
-                trained_frames: trained_end - trained_first,
-            }
-        });
+        let segments = (0..count).map(|number| PlannedSegment::showing(begin(number), begin(number + 1), frames));
         Ok(Self { frames, seconds, segments: segments.collect() })
+    }
+
+    /// Whether the plan divides this very take.
+    pub fn has_all_of(&self, data: &Scene) -> bool {
+        times(data) == self.frames
     }
 
     /// Seconds from one frame to the next.

@@ -34,8 +34,7 @@ pub(super) fn looked_at(data: &Scene) -> Vec<&Frame> {
     let wanted = (VIEWS / cameras).clamp(3, VIEWS);
     let stride = times.len().div_ceil(wanted).max(1);
     let chosen: Vec<u32> = times.iter().copied().skip(stride / 2).step_by(stride).collect();
-    let mut frames: Vec<&Frame> =
-        data.train.iter().filter(|frame| chosen.contains(&frame.time.to_bits())).collect();
+    let mut frames: Vec<&Frame> = data.train.iter().filter(|frame| chosen.contains(&frame.time.to_bits())).collect();
     frames.sort_by(|a, b| a.time.total_cmp(&b.time));
     frames
 }

@@ -110,6 +110,11 @@ enum Command {
     /// Write the file of a take from the segments that are trained: the first half plays while the second is in training.
     #[command(after_help = "Example:\n  light4gs join runs/walk")]
     Join(take::Join),
+    /// Train what has been filmed after the end of a take: its base and its segments stay as they are.
+    ///
+    /// The same command goes on where it was stopped.
+    #[command(after_help = "Example:\n  light4gs extend runs/walk data/walk-longer")]
+    Extend(take::Extend),
     /// One task of a take, as its launcher starts it.
     #[command(hide = true)]
     TakeTask(take::TakeTask),
@@ -146,6 +151,7 @@ impl Cli {
             Command::Gather(command) => command.run(),
             Command::StudyTask(command) => command.run(),
             Command::Join(command) => command.run(),
+            Command::Extend(command) => command.run(),
             Command::TakeTask(command) => command.run(),
             Command::Compare(command) => command.run(),
             Command::Bench(command) => command.run(),

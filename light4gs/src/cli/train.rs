@@ -102,6 +102,9 @@ impl Train {
         if self.segment.is_none() && (self.launch.jobs > 1 || self.launch.launcher != Launcher::Local) {
             return Err(TrainError::Input("--jobs and --launcher are for takes; give --segment SECONDS too".into()));
         }
+        if self.segment.is_some() {
+            self.wishes.refuse_targets()?;
+        }
         let config = self.wishes.config(&preset, &overrides, &scene, automatic, self.output.quiet)?;
         match self.segment {
             Some(segment) => train_take(&config, &scene, &self.out, segment, &self.launch, self.output.quiet),
@@ -109,6 +112,9 @@ impl Train {
         }
     }
 }
+
+/// Captures that last longer, in seconds, are better trained in segments.
+const LONGEST_CLIP: f64 = 15.0;
 
 /// The length of a segment.
 fn seconds(text: &str) -> Result<f64, String> {
@@ -130,6 +136,12 @@ pub(super) fn train(
     let (capture, _) = understand(&image_store(&config), &data)?;
     tell_capture(&capture);
     refuse_problems(scene, &capture)?;
+    if let Some(seconds) = data.seconds.filter(|seconds| *seconds > LONGEST_CLIP) {
+        tell(format_args!(
+            "note: this capture lasts {seconds:.0} seconds and is trained as one clip, whose motion must be learned at once; \
+             `--segment 2` trains it as a take, in segments (docs/takes.md)"
+        ));
+    }
     // If the encoder would refuse the scene, for example for a point at 3e38, the run that --overwrite replaces must
     // not be lost.
     Trainer::builder(config.clone(), data).check()?;

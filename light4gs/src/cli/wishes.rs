@@ -39,6 +39,21 @@ pub(super) struct Wishes {
 }
 
 impl Wishes {
+    /// Refuses a wish for the size or the quality of one file, for trainings that write several.
+    ///
+    /// # Errors
+    /// [`TrainError::Input`] with what to give in its place.
+    pub(super) fn refuse_targets(&self) -> Result<(), TrainError> {
+        let named = [("--target-bytes", self.target_bytes.is_some()), ("--target-db", self.target_db.is_some())];
+        match named.iter().find(|(_, given)| *given) {
+            Some((name, _)) => Err(TrainError::Input(format!(
+                "{name} is for one scene, and --segment trains several; give a preset of a size, such as `+medium` or \
+                 `+small`, or `--set compression.rate.attribute_lambda=...`"
+            ))),
+            None => Ok(()),
+        }
+    }
+
     /// The configuration that presets, wishes and overrides give; the overrides win. Where the preset is `automatic`,
     /// the number of Gaussians follows the images even without a wish. Says how long the training will take, unless it
     /// is short or `quiet`.

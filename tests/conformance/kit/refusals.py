@@ -17,6 +17,7 @@ from l4gs.text import lines
 
 from .fields import fields
 from .forging import Edit, forge, split
+from .takes import TAKE_RULES, edits_of_take
 
 GOLDEN, STREAMS = "../../golden-streams/", "../streams/"
 FLOAT32, COMPACT, PAPER, NODES = (f"{GOLDEN}{name}.l4gs" for name in ("float32", "compact", "paper", "nodes"))
@@ -484,13 +485,20 @@ def list_of_refusals(folder: pathlib.Path) -> str:
     blocks = ["# Files that every decoder refuses. `check --write` makes this list of ../kit/refusals.py.\n"]
     for name, source, changes in RULES:
         data = (folder / source).read_bytes()
-        edits = _edits(data, changes)
-        try:
-            lines(forge(data, edits), ["0"])
-            raise ValueError(f"{name} is accepted")
-        except Refused as refused:
-            said = refused
-        block = [f"refused {name}", f"from {source}"]
-        block += [f"edit {edit.part}@{edit.offset}-{edit.length}={edit.new.hex()}" for edit in edits]
-        blocks.append("\n".join([*block, f"expects {said.part}: {said.field}: {said.expectation}"]) + "\n")
+        blocks.append(_block(name, source, data, _edits(data, changes)))
+    for name, source, of_take in TAKE_RULES:
+        data = (folder / source).read_bytes()
+        blocks.append(_block(name, source, data, edits_of_take(data, of_take)))
     return "\n".join(blocks)
+
+
+def _block(name: str, source: str, data: bytes, edits: list[Edit]) -> str:
+    """The lines of a file that is refused."""
+    try:
+        lines(forge(data, edits), ["0"])
+        raise ValueError(f"{name} is accepted")
+    except Refused as refused:
+        said = refused
+    block = [f"refused {name}", f"from {source}"]
+    block += [f"edit {edit.part}@{edit.offset}-{edit.length}={edit.new.hex()}" for edit in edits]
+    return "\n".join([*block, f"expects {said.part}: {said.field}: {said.expectation}"]) + "\n"

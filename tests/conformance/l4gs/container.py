@@ -125,6 +125,14 @@ def _read_meta(reader: Reader) -> Meta:
     reader.require(width * height <= limits.CAMERA_PIXELS, "height", f"at most {limits.CAMERA_PIXELS} pixels")
     field_of_view = reader.f32("field of view")
     reader.require(0 <= float(field_of_view) < math.pi, "field of view", "not negative, below pi")
+    extra = read_extra_entries(reader)
+    reader.end()
+    return Meta(
+        name, frames, frames_a_second, smallest, largest, background, digest, width, height, field_of_view, extra
+    )
+
+
+def read_extra_entries(reader: Reader) -> dict[str, str]:
     count = reader.u32("number of extra entries")
     reader.require(count <= limits.EXTRA_ENTRIES, "number of extra entries", f"at most {limits.EXTRA_ENTRIES}")
     extra: dict[str, str] = {}
@@ -136,10 +144,7 @@ def _read_meta(reader: Reader) -> Meta:
         reader.require(before is None or before < sorted_key, "key", "keys sorted by their bytes, none twice")
         before = sorted_key
         extra[key] = value
-    reader.end()
-    return Meta(
-        name, frames, frames_a_second, smallest, largest, background, digest, width, height, field_of_view, extra
-    )
+    return extra
 
 
 def _read_table(table: Reader, count: int, data: bytes) -> dict[str, Section]:

@@ -60,6 +60,9 @@ class Reader:
     def u64(self, field: str) -> int:
         return int(struct.unpack("<Q", self.take(8, field))[0])
 
+    def f64(self, field: str) -> float:
+        return float(struct.unpack("<d", self.take(8, field))[0])
+
     def f32s(self, shape: tuple[int, ...], field: str) -> np.ndarray:
         """An array of finite float32 numbers."""
         count = 1

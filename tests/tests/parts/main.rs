@@ -3,6 +3,7 @@
 
 mod attribute_entropy;
 mod back_ends_agree;
+mod backdrop;
 mod compression;
 mod context_model;
 mod control_nodes;

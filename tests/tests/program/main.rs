@@ -10,6 +10,7 @@ mod kills;
 mod resume;
 mod scene_files;
 mod studies;
+mod takes;
 #[cfg(target_os = "linux")]
 mod view;
 

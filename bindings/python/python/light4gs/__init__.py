@@ -10,7 +10,7 @@
 from ._camera import Camera
 from ._errors import Error
 from ._native import __version__
-from ._scene import Gaussians, InriaGaussians, Scene, from_bytes, limits, open
+from ._scene import Gaussians, InriaGaussians, Scene, Take, from_bytes, limits, open
 
 __all__ = [
     "Camera",
@@ -18,6 +18,7 @@ __all__ = [
     "Gaussians",
     "InriaGaussians",
     "Scene",
+    "Take",
     "__version__",
     "from_bytes",
     "limits",

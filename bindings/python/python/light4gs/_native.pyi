@@ -24,6 +24,25 @@ class Scene:
         background: list[float],
     ) -> bytearray: ...
 
+@final
+class Take:
+    @staticmethod
+    def open(path: str | PathLike[str], limits: dict[str, int] | None) -> Take: ...
+    @staticmethod
+    def from_bytes(bytes: bytes, limits: dict[str, int] | None) -> Take: ...
+    def metadata(self) -> dict[str, object]: ...
+    def gsplat(self, seconds: float) -> list[bytearray]: ...
+    def inria(self, seconds: float) -> tuple[list[bytearray], dict[str, tuple[int, bytearray]]]: ...
+    def render(
+        self,
+        size: tuple[int, int],
+        intrinsics: tuple[float, float, float, float],
+        rotation: list[float],
+        translation: list[float],
+        seconds: float,
+        background: list[float],
+    ) -> bytearray: ...
+
 def check_camera(
     size: tuple[int, int],
     intrinsics: tuple[float, float, float, float],

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import os
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -12,6 +13,7 @@ import numpy.typing as npt
 
 from . import _native
 from ._camera import Camera, floats
+from ._errors import Error
 
 Floats = npt.NDArray[np.float32]
 
@@ -67,13 +69,14 @@ def _array(data: bytearray, *shape: int) -> Floats:
     return np.frombuffer(data, dtype=np.float32).reshape(shape)
 
 
-def _time(value: object) -> float:
+def _number(value: object) -> float:
     if isinstance(value, bool) or not isinstance(value, (int, float, np.integer, np.floating)):
         raise TypeError(f"the time must be a number, not {type(value).__name__}")
-    time = float(value)
-    if not 0.0 <= time <= 1.0:
-        raise ValueError(f"the time is {time}, expected a number from 0 (first frame) to 1 (last)")
-    return time
+    return float(value)
+
+
+#: Degrees of spherical harmonics by the number of their coefficients.
+_DEGREES = {(degree + 1) ** 2: degree for degree in range(4)}
 
 
 class Scene:
@@ -109,8 +112,8 @@ class Scene:
     #: Length of each section in bytes, by name, in the order of the stream.
     sections: dict[str, int]
 
-    def __init__(self, native: _native.Scene) -> None:
-        if not isinstance(native, _native.Scene):
+    def __init__(self, native: Union[_native.Scene, _native.Take]) -> None:
+        if not isinstance(native, self._made_of()):
             raise TypeError("light4gs.open and light4gs.from_bytes make scenes")
         self._native = native
         # What comes from the native part has the types above.
@@ -120,6 +123,17 @@ class Scene:
         entries["sections"] = dict(entries["sections"])
         for name, value in entries.items():
             setattr(self, name, value)
+
+    @staticmethod
+    def _made_of() -> type:
+        return _native.Scene
+
+    def _time(self, value: object) -> float:
+        """The time of a call, checked."""
+        time = _number(value)
+        if not 0.0 <= time <= 1.0:
+            raise ValueError(f"the time is {time}, expected a number from 0 (first frame) to 1 (last)")
+        return time
 
     def __repr__(self) -> str:
         return (
@@ -138,21 +152,22 @@ class Scene:
 
         Raises ``ValueError`` for another time or convention, ``TypeError`` for a time that is no number.
         """
-        seconds = _time(time)
-        count, degree = self.gaussian_count, self.sh_degree
-        coefficients = (degree + 1) ** 2
+        checked = self._time(time)
         if convention == "gsplat":
-            means, quats, scales, opacities, sh = self._native.gsplat(seconds)
+            means, quats, scales, opacities, sh = self._native.gsplat(checked)
+            # Three numbers a Gaussian, and three a coefficient. A take has more Gaussians at some times than at others.
+            count, coefficients = len(means) // 12, len(sh) // len(means) if means else (self.sh_degree + 1) ** 2
             return Gaussians(
                 means=_array(means, count, 3),
                 quats=_array(quats, count, 4),
                 scales=_array(scales, count, 3),
                 opacities=_array(opacities, count),
                 sh=_array(sh, count, coefficients, 3),
-                sh_degree=degree,
+                sh_degree=_DEGREES[coefficients],
             )
         if convention == "inria":
-            (means, f_dc, f_rest, opacity, scale, rot), further = self._native.inria(seconds)
+            (means, f_dc, f_rest, opacity, scale, rot), further = self._native.inria(checked)
+            count, coefficients = len(means) // 12, 1 + len(f_rest) // len(means) if means else (self.sh_degree + 1) ** 2
             return InriaGaussians(
                 means=_array(means, count, 3),
                 f_dc=_array(f_dc, count, 3),
@@ -161,7 +176,7 @@ class Scene:
                 scale=_array(scale, count, 3),
                 rot=_array(rot, count, 4),
                 further={name: _array(data, count, width) for name, (width, data) in further.items()},
-                sh_degree=degree,
+                sh_degree=_DEGREES[coefficients],
             )
         raise ValueError(f'the convention is {convention!r}, expected "gsplat" or "inria"')
 
@@ -189,14 +204,45 @@ class Scene:
             camera._intrinsics(),
             list(camera.rotation),
             list(camera.translation),
-            _time(time),
+            self._time(time),
             color,
         )
         return _array(data, camera.height, camera.width, 3)
 
 
+class Take(Scene):
+    """Minutes in one file: a base that stands still, and segments in time. :func:`light4gs.open` gives one for such a file.
+
+    :meth:`gaussians` and :meth:`render` take **seconds of the take** in place of a time in [0, 1]. Where no segment is, the base
+    alone is there. The number of Gaussians and the degree of their harmonics change from segment to segment; the attributes
+    ``gaussian_count``, ``sh_degree``, ``bounds``, ``background``, ``frame_count``, ``width``, ``height``, ``fov_x``, ``bytes`` and ``sections`` are
+    those of the base. Segments are read and decoded when they are needed, and the last three are kept.
+    """
+
+    #: Seconds of the take.
+    seconds: float
+    #: Begin and end of each segment in seconds, by rising begins.
+    segments: list[tuple[float, float]]
+
+    @staticmethod
+    def _made_of() -> type:
+        return _native.Take
+
+    def _time(self, value: object) -> float:
+        seconds = _number(value)
+        if not math.isfinite(seconds):
+            raise ValueError(f"the time is {seconds}, expected a finite number of seconds")
+        return seconds
+
+    def __repr__(self) -> str:
+        return (
+            f"<light4gs.Take {self.name!r}: {self.seconds:g} seconds, {len(self.segments)} segments, "
+            f"{self.gaussian_count} Gaussians in the base>"
+        )
+
+
 def open(path: Union[str, os.PathLike[str]], *, limits: Mapping[str, int] | None = None) -> Scene:
-    """Reads a file.
+    """Reads a file: a scene, or a :class:`Take`, of which the segments are read when they are needed.
 
     ``limits`` changes the default limits of the decoder by name; see :func:`light4gs.limits`. The interpreter's lock is
     released while the file is decoded.
@@ -205,15 +251,27 @@ def open(path: Union[str, os.PathLike[str]], *, limits: Mapping[str, int] | None
     """
     if not isinstance(path, (str, os.PathLike)):
         raise TypeError(f"the path must be a str or a path, not {type(path).__name__}; from_bytes takes bytes")
-    return Scene(_native.Scene.open(path, _limits(limits)))
+    checked = _limits(limits)
+    try:
+        return Scene(_native.Scene.open(path, checked))
+    except Error as error:
+        if error.kind != "is-take":
+            raise
+    return Take(_native.Take.open(path, checked))
 
 
 def from_bytes(data: Union[bytes, bytearray, memoryview], *, limits: Mapping[str, int] | None = None) -> Scene:
-    """Reads a stream in memory. Otherwise as :func:`open`."""
+    """Reads a stream or a take in memory. Otherwise as :func:`open`."""
     if not isinstance(data, (bytes, bytearray, memoryview)):
         raise TypeError(f"the stream must be bytes, not {type(data).__name__}; open takes a path")
     # Others could change while the lock is released.
-    return Scene(_native.Scene.from_bytes(bytes(data), _limits(limits)))
+    own, checked = bytes(data), _limits(limits)
+    try:
+        return Scene(_native.Scene.from_bytes(own, checked))
+    except Error as error:
+        if error.kind != "is-take":
+            raise
+    return Take(_native.Take.from_bytes(own, checked))
 
 
 def _limits(limits: Mapping[str, int] | None) -> dict[str, int] | None:

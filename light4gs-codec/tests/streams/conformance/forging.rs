@@ -33,10 +33,12 @@ impl Edit {
     }
 }
 
-/// A legal stream after some edits.
+/// A legal stream after some edits; a take, which has no such parts, only after edits of the file.
 pub(super) fn forge(bytes: &[u8], edits: &[Edit]) -> Vec<u8> {
-    if edits.is_empty() {
-        return bytes.to_vec();
+    if edits.iter().all(|edit| edit.part == "file") {
+        let mut forged = bytes.to_vec();
+        edits.iter().for_each(|edit| edit.apply(&mut forged));
+        return forged;
     }
     let mut parts = split(bytes);
     for edit in edits.iter().filter(|edit| !matches!(edit.part.as_str(), "header" | "file")) {

@@ -1,6 +1,7 @@
 //! The conformance set, `tests/conformance`, against this decoder: accepted files to the bit, and refused files.
 
 mod forging;
+mod takes;
 #[path = "../../../examples/conformance/text.rs"]
 mod text;
 mod written;

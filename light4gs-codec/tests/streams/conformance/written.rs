@@ -32,7 +32,7 @@ const MAPPING: CoordinateMapping = CoordinateMapping {
     time_offset: 0.15,
 };
 
-fn compressed(scene: &SceneData, input: &CompressionInput) -> Vec<u8> {
+pub(super) fn compressed(scene: &SceneData, input: &CompressionInput) -> Vec<u8> {
     encode_compressed(scene, input).unwrap().bytes
 }
 
@@ -173,7 +173,7 @@ fn shared_degrees(features: u32) -> ShCoding {
 }
 
 /// Gaussians in clusters, whose attributes follow from their places, so that prediction pays.
-fn clusters(count: usize) -> GaussianArrays {
+pub(super) fn clusters(count: usize) -> GaussianArrays {
     let mut random = Random::new(31);
     let mut gaussians = GaussianArrays { sh_degree: 1, ..GaussianArrays::default() };
     for index in 0..count {
@@ -345,7 +345,7 @@ fn streams() -> Vec<(&'static str, Vec<u8>)> {
 #[test]
 #[ignore = "writes the streams of the conformance set anew, which only a change of the format may ask for"]
 fn write_conformance_streams() {
-    for (name, bytes) in streams() {
+    for (name, bytes) in streams().into_iter().chain(super::takes::takes()) {
         fs::write(format!("{}/streams/{name}.l4gs", super::FOLDER), bytes).unwrap();
     }
 }

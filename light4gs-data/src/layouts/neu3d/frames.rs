@@ -70,7 +70,7 @@ pub(super) fn find(
         None => None,
     };
     Ok(match timed {
-        Some((instants, rate)) => {
+        Some(Clock { instants, rate }) => {
             let frames = lists.into_iter().zip(instants).map(|(list, instants)| shown(list, &instants)).collect();
             Rig { frames, rate: Some(rate) }
         }
@@ -164,13 +164,21 @@ fn by_numbers(lists: Vec<Vec<PathBuf>>, notes: &mut Vec<String>) -> Vec<Vec<RigF
     lists.into_iter().enumerate().map(of_camera).collect()
 }
 
-/// The instants of the frames of videos that begin at the same time, and how many there are a second; `None` where there are too few frames to tell a rate.
+/// When the frames of videos are shown.
+struct Clock {
+    /// Those of each camera, in frames from the first of the rig.
+    instants: Vec<Vec<f64>>,
+    /// Frames a second.
+    rate: f64,
+}
+
+/// The clock of videos that begin at the same time; `None` where there are too few frames to tell a rate.
 fn by_times(
     root: &Path,
     records: &[Taken],
     length: Option<usize>,
     notes: &mut Vec<String>,
-) -> Result<Option<(Vec<Vec<f64>>, f64)>, DataError> {
+) -> Result<Option<Clock>, DataError> {
     let mut rates: Vec<f64> = records.iter().map(Taken::rate).collect();
     if rates.contains(&0.0) {
         return Ok(None);
@@ -217,5 +225,5 @@ fn by_times(
     }
     let instant = |(k, seconds): (usize, &f64)| if regular { k as f64 } else { seconds * rate };
     let instants = records.iter().map(|record| record.seconds.iter().enumerate().map(instant).collect()).collect();
-    Ok(Some((instants, rate)))
+    Ok(Some(Clock { instants, rate }))
 }

@@ -99,9 +99,10 @@ impl Actor {
             phase: rng.random_range(0.0..TAU),
         };
         let textures = match kind {
-            Kind::Ball { .. } => [texture(hue, Pattern::Stripes, 18.0), texture(hue, Pattern::Stripes, 18.0)],
-            Kind::Crate { .. } => [texture(hue, Pattern::Checker, 15.0), texture(hue, Pattern::Checker, 15.0)],
-            Kind::Wheel { .. } => [texture(hue, Pattern::Sectors, 8.0), texture(hue, Pattern::Sectors, 8.0)],
+            Kind::Ball { .. } => [texture(hue, Pattern::Stripes, 18.0); 2],
+            // A checker is a product of three waves. On each side of the crate one of them is constant, at an extreme.
+            Kind::Crate { .. } => [Texture { phase: FRAC_PI_2, ..texture(hue, Pattern::Checker, 15.0) }; 2],
+            Kind::Wheel { .. } => [texture(hue, Pattern::Sectors, 8.0); 2],
             Kind::Figure => [texture(hue, Pattern::Stripes, 26.0), texture(hue + 0.5, Pattern::Stripes, 14.0)],
         };
         Self { kind, textures, home, legs: Vec::new(), begins: Vec::new() }

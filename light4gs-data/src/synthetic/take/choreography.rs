@@ -74,7 +74,7 @@ fn next(members: &[Member], seconds: f32) -> Option<usize> {
 fn company(seconds: f32, rng: &mut ChaCha8Rng) -> Vec<Member> {
     let ball = Kind::Ball { radius: 0.28 };
     let wheel = Kind::Wheel { major: 0.27, minor: 0.1 };
-    let block = Kind::Crate { half: Vec3::new(0.22, 0.26, 0.3) };
+    let block = Kind::Crate { half: Vec3::new(0.21, 0.21, 0.42) };
     let inside = [
         (Kind::Figure, Role::Walker),
         (ball, Role::Walker),

@@ -80,6 +80,30 @@ fn light_and_cut_act_when_they_should() {
     assert!(center(&plain, 27).distance(center(&cut, 27)) > 1.0);
 }
 
+/// A camera that is held still for a fifth of a second sees which pixels change.
+#[test]
+fn cameras_see_motion_almost_all_the_time() {
+    for (cameras, seed) in [(1, 0), (1, 1), (4, 2)] {
+        let options = TakeOptions { width: 40, height: 30, cameras, seed, ..Default::default() };
+        let cameras = Cameras::new(&options);
+        let stage = Stage::new(&options, &cameras);
+        let share = |seconds: f32| {
+            let (now, later) = (stage.at(seconds), stage.at(seconds + 0.2));
+            let camera = cameras.at(seconds)[0];
+            let (eye, ray) = (camera.center(), rays(&camera));
+            let changed = |k: u32| {
+                let ray = ray((k % 40) as f32 + 0.5, (k / 40) as f32 + 0.5);
+                now.see(eye, ray).1.distance(later.see(eye, ray).1) > 0.03
+            };
+            (0..40 * 30).filter(|k| changed(*k)).count() as f32 / 1200.0
+        };
+        let shares: Vec<f32> = (0..118).map(|k| share(0.5 * k as f32)).collect();
+        let seen = shares.iter().filter(|share| **share > 0.003).count() as f32 / shares.len() as f32;
+        let mean = shares.iter().sum::<f32>() / shares.len() as f32;
+        assert!(seen > 0.85 && (0.01..0.3).contains(&mean), "motion in {seen} of the views, {mean} of the pixels");
+    }
+}
+
 #[test]
 fn bad_options_are_named() {
     let folder = tempfile::tempdir().unwrap();
@@ -100,6 +124,43 @@ fn bad_options_are_named() {
     assert_eq!(fs::read_dir(folder.path()).unwrap().count(), 0);
 }
 
+/// The images are links to one file, so that the page cache holds them as it would hold the headers of others.
+#[test]
+#[ignore = "it measures time: alone, with --ignored --nocapture"]
+fn six_thousand_frames_open_within_seconds() {
+    let (folder, _) = written(&TakeOptions { cameras: 19, seconds: 1.0, frames_a_second: 2.0, ..small() });
+    let root = folder.path().join("take");
+    let instants = 300;
+    let mut document: Value = serde_json::from_slice(&fs::read(root.join("transforms.json")).unwrap()).unwrap();
+    let cameras: Vec<Value> = document["frames"].as_array().unwrap().iter().step_by(2).cloned().collect();
+    let (mut frames, mut train, mut test) = (Vec::new(), Vec::new(), Vec::new());
+    for (number, camera) in cameras.iter().enumerate() {
+        for i in 0..instants {
+            let name = format!("images/cam{number:02}/{i:04}.png");
+            if i > 1 {
+                fs::hard_link(root.join("images/cam00/0000.png"), root.join(&name)).unwrap();
+            }
+            let mut frame = camera.clone();
+            (frame["file_path"], frame["time"]) = (json!(name), json!(i as f64 / 30.0));
+            frames.push(frame);
+            if number == 0 { test.push(name) } else { train.push(name) }
+        }
+    }
+    document["frames"] = json!(frames);
+    (document["train_filenames"], document["test_filenames"]) = (json!(train), json!(test));
+    document["fps"] = json!(30);
+    fs::write(root.join("transforms.json"), document.to_string()).unwrap();
+    let begin = std::time::Instant::now();
+    let scene = Scene::open(&root, &LoadOptions::default()).unwrap();
+    let seconds = begin.elapsed().as_secs_f64();
+    eprintln!("{} frames opened in {seconds:.2} s", scene.train.len() + scene.test.len());
+    assert_eq!((scene.train.len(), scene.test.len()), (5700, 300));
+    assert!(seconds < 5.0, "{seconds} s");
+    let begin = std::time::Instant::now();
+    let part = scene.between(0.25, 0.5).unwrap();
+    eprintln!("{} of them between 0.25 and 0.5 in {:.3} s", part.train.len(), begin.elapsed().as_secs_f64());
+}
+
 /// `LIGHT4GS_TAKE=FOLDER cargo test --release -p light4gs-data --lib a_take_to_look_at -- --ignored` writes the default take.
 #[test]
 #[ignore = "it writes a take of a minute to be looked at, where LIGHT4GS_TAKE says"]
@@ -107,7 +168,9 @@ fn a_take_to_look_at() {
     let Some(root) = std::env::var_os("LIGHT4GS_TAKE") else { return };
     let begin = std::time::Instant::now();
     let cameras = std::env::var("LIGHT4GS_TAKE_CAMERAS").map_or(1, |text| text.parse().unwrap());
-    let middle = (cameras == 1).then_some(30.0);
-    write_take(root.as_ref(), &TakeOptions { cameras, cut: middle, light: Some(45.0), ..Default::default() }).unwrap();
+    let seconds = std::env::var("LIGHT4GS_TAKE_SECONDS").map_or(60.0, |text| text.parse().unwrap());
+    let options = TakeOptions { seconds, cameras, light: Some(0.75 * seconds), ..Default::default() };
+    let cut = (cameras == 1).then_some(0.5 * seconds);
+    write_take(root.as_ref(), &TakeOptions { cut, ..options }).unwrap();
     eprintln!("written in {:.1} s", begin.elapsed().as_secs_f64());
 }

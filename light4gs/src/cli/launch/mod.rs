@@ -46,9 +46,9 @@ impl LaunchOptions {
     /// [`TrainError::Input`] for settings without that launcher, and for a file that is none.
     pub(super) fn settings(&self) -> Result<slurm::Settings, TrainError> {
         match &self.slurm {
-            Some(_) if self.launcher != Launcher::Slurm => Err(TrainError::Input(
-                "--slurm is for --launcher slurm; give that too, or leave it out".into(),
-            )),
+            Some(_) if self.launcher != Launcher::Slurm => {
+                Err(TrainError::Input("--slurm is for --launcher slurm; give that too, or leave it out".into()))
+            }
             Some(path) => slurm::Settings::load(path),
             None => Ok(slurm::Settings::default()),
         }

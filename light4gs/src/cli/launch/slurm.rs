@@ -5,6 +5,7 @@
 //! run writes a checkpoint and ends with exit code 75, and the script asks for its job to be queued again. A task that
 //! was killed by a signal is queued again as well, a few times.
 
+use std::io::Write;
 use std::path::{Path, PathBuf};
 use std::process::Command;
 

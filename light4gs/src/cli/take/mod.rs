@@ -1,4 +1,4 @@
-//! Takes: `train --segment`, `join`, and the task that launchers start.
+//! Takes: `train --segment`, `extend`, `join`, and the task that launchers start.
 
 mod measure;
 mod task;
@@ -40,17 +40,27 @@ pub(super) fn train_take(
     launch: &LaunchOptions,
     quiet: bool,
 ) -> Result<(), TrainError> {
-    let settings = launch.settings()?;
     let data = Scene::open(scene, &load_options(config))?;
-    let seconds = data.seconds.ok_or_else(|| {
+    let plan = TakePlan::of(&data, seconds_of(&data)?, segment)?;
+    let folder = TakeFolder::create(out, scene, &data, plan, config)?;
+    train_missing(&folder, launch, quiet)
+}
+
+/// The length of a take.
+fn seconds_of(data: &Scene) -> Result<f64, TrainError> {
+    data.seconds.ok_or_else(|| {
         TrainError::Input(format!(
             "how long {} lasts is not known, so it cannot be divided into segments of seconds; give the frames a second: \
              --set data.frames_a_second=30",
-            scene.display()
+            data.root.display()
         ))
-    })?;
-    let plan = TakePlan::of(&data, seconds, segment)?;
-    let folder = TakeFolder::create(out, scene, &data, plan, config)?;
+    })
+}
+
+/// Trains what of a take is not finished, and writes its file.
+fn train_missing(folder: &TakeFolder, launch: &LaunchOptions, quiet: bool) -> Result<(), TrainError> {
+    let settings = launch.settings()?;
+    let out = folder.root();
     let plan = &folder.record().plan;
     let count = plan.segments.len();
     say(format_args!(
@@ -66,18 +76,18 @@ pub(super) fn train_take(
         (0..count).filter(|number| !is_finished(&folder.segment(*number))).map(|number| number + 1).collect();
     match launch.launcher {
         Launcher::Local => {
-            local::run_all(&folder, base, 1, quiet)?;
+            local::run_all(folder, base, 1, quiet)?;
             if !is_finished(&folder.base()) {
-                return Err(unfinished(&folder, BASE, "the base"));
+                return Err(unfinished(folder, BASE, "the base"));
             }
-            local::run_all(&folder, segments, launch.jobs as usize, quiet)?;
-            join(&folder)?;
+            local::run_all(folder, segments, launch.jobs as usize, quiet)?;
+            join(folder)?;
             match (0..count).find(|number| !is_finished(&folder.segment(*number))) {
-                Some(number) => Err(unfinished(&folder, number + 1, &format!("segment {number}"))),
+                Some(number) => Err(unfinished(folder, number + 1, &format!("segment {number}"))),
                 None => Ok(()),
             }
         }
-        Launcher::Slurm => slurm::submit(&folder, &[base, segments], launch.jobs, &settings),
+        Launcher::Slurm => slurm::submit(folder, &[base, segments], launch.jobs, &settings),
     }
 }
 
@@ -85,7 +95,10 @@ pub(super) fn train_take(
 fn unfinished(folder: &TakeFolder, task: usize, part: &str) -> TrainError {
     let said = std::fs::read_to_string(folder.failure(task)).unwrap_or_default();
     let root = folder.root().display();
-    TrainError::Input(format!("{part} is not finished: {} (the same command goes on; logs are in {root}/.logs)", said.trim()))
+    TrainError::Input(format!(
+        "{part} is not finished: {} (the same command goes on; logs are in {root}/.logs)",
+        said.trim()
+    ))
 }
 
 fn join(folder: &TakeFolder) -> Result<(), TrainError> {
@@ -100,6 +113,29 @@ fn join(folder: &TakeFolder) -> Result<(), TrainError> {
         plan.segments.len(),
         bytes as f64 / 1e3 / frames.max(1) as f64
     ))
+}
+
+#[derive(Debug, Args)]
+pub(super) struct Extend {
+    /// Folder of a take that is trained.
+    run: PathBuf,
+    /// Folder of the dataset with more frames after those of the take; it may be the take's own, which has grown.
+    scene: PathBuf,
+    #[command(flatten)]
+    launch: LaunchOptions,
+    /// No progress bars.
+    #[arg(long)]
+    quiet: bool,
+}
+
+impl Extend {
+    pub(super) fn run(self) -> Result<(), TrainError> {
+        let mut folder = TakeFolder::open(&self.run)?;
+        let data = Scene::open(&self.scene, &load_options(folder.config()))?;
+        let seconds = seconds_of(&data)?;
+        folder.extend(&self.scene, &data, seconds)?;
+        train_missing(&folder, &self.launch, self.quiet)
+    }
 }
 
 #[derive(Debug, Args)]

@@ -1,8 +1,10 @@
 //! `view`.
 
+mod body;
 mod connections;
 mod request;
 mod server;
+mod take;
 
 use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
@@ -15,12 +17,16 @@ use light4gs_train::config::{Config, DeviceName};
 use light4gs_train::dataset::load_options;
 use light4gs_train::error::TrainError;
 use light4gs_train::run::RunFolder;
+use light4gs_train::take::TakeFolder;
 use light4gs_train::view_source::{Shown, ViewSource};
 use light4gs_web::page::{Content, PLAYER, TRAINER, TRAINER_PAGE, page};
 use serde_json::json;
 
-use self::server::{Answer, Body, Server};
+use self::body::Body;
+use self::server::{Answer, Server};
+use self::take::TakeSource;
 use super::output::{say, tell};
+use super::take::is_take_file;
 
 /// The player's script.
 const PLAYER_ADDRESS: &str = "light4gs-player.js";
@@ -41,6 +47,9 @@ const SCENE_POLICY: &str = "default-src 'none'; script-src 'self' 'wasm-unsafe-e
 const TRAINER_POLICY: &str = "default-src 'none'; script-src 'self' 'unsafe-inline' 'wasm-unsafe-eval'; worker-src blob:; \
      connect-src 'self' blob:; style-src 'unsafe-inline'; img-src data: blob:; base-uri 'none'; form-action 'none'; \
      frame-ancestors 'none'";
+
+/// What the page of a scene asks for.
+const SERVED: Content<'static> = Content::Served { scene: "scene.l4gs", cameras: "cameras.json", watch: "state.json" };
 
 /// Most cameras of each split that the player lists.
 const MOST_CAMERAS: usize = 500;
@@ -76,17 +85,46 @@ impl View {
         }
     }
 
+    /// A page that plays a take, and follows it while it is trained. Its file stays on disk, and is sent by ranges.
+    fn play_take(&self, take: TakeSource) -> Result<(), TrainError> {
+        let cameras = match (&self.scene, take.dataset()) {
+            (Some(named), _) => cameras_json(&Scene::open(named, &load_options(&Config::default()))?, MOST_CAMERAS),
+            // If the dataset no longer exists, the take can be played all the same.
+            (None, Some((folder, dataset))) => Scene::open(dataset, &load_options(folder.config()))
+                .map_or_else(|_| "[]".to_owned(), |scene| cameras_json(&scene, MOST_CAMERAS)),
+            (None, None) => "[]".to_owned(),
+        };
+        let html = page(&take.title(), SERVED, Some(PLAYER_ADDRESS));
+        let (html, cameras) = (Body::from(html), Body::from(cameras));
+        take.newest();
+        self.serve(SCENE_POLICY, move |path| match path {
+            "/" => Some(answer(HTML, html.clone())),
+            "/cameras.json" => Some(answer(JSON, cameras.clone())),
+            "/scene.l4gs" => Some(answer("application/octet-stream", Body::File(take.path()))),
+            "/state.json" => {
+                let state = take.newest();
+                Some(answer(JSON, json!({ "scene": state.version, "status": state.status }).to_string()))
+            }
+            _ => None,
+        })
+    }
+
     /// A page that plays a scene.
     fn play(&self, what: &Path) -> Result<(), TrainError> {
         let limits = light4gs_web::limits();
+        if TakeFolder::is_one(what) {
+            return self.play_take(TakeSource::folder(what)?);
+        }
+        if is_take_file(what) {
+            return self.play_take(TakeSource::file(what, &limits)?);
+        }
         let mut source =
             if what.is_dir() { ViewSource::run(what, self.device)? } else { ViewSource::file(what, &limits)? };
         let cameras = match (&self.scene, source.dataset()) {
             (None, Some(dataset)) => cameras_json(dataset, MOST_CAMERAS),
             _ => dataset_cameras(what, self.scene.as_deref(), MOST_CAMERAS)?,
         };
-        let content = Content::Served { scene: "scene.l4gs", cameras: "cameras.json", watch: "state.json" };
-        let html = page(&source.title(), content, Some(PLAYER_ADDRESS));
+        let html = page(&source.title(), SERVED, Some(PLAYER_ADDRESS));
         let (html, cameras) = (Body::from(html), Body::from(cameras));
         let state = State { shown: Mutex::new(source.refresh().clone()), source: Mutex::new(source) };
         self.serve(SCENE_POLICY, move |path| match path {

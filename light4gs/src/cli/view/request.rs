@@ -1,5 +1,7 @@
 //! The head of an HTTP request: what is asked for, and of whom.
 
+use std::ops::Range;
+
 use super::connections::LONGEST_HEAD;
 
 /// What a client asks for.
@@ -7,6 +9,8 @@ use super::connections::LONGEST_HEAD;
 pub(super) enum Request {
     Get {
         path: String,
+        /// The part that is wanted, where it is one; other kinds of ranges count as none.
+        range: Option<ByteRange>,
     },
     /// Answered like GET, but without the body.
     Head {
@@ -28,13 +32,51 @@ impl Request {
             return Self::Other;
         }
         let fields = lines.take_while(|line| !line.is_empty()).filter_map(|line| line.split_once(':'));
-        let mut hosts =
-            fields.filter(|(name, _)| name.eq_ignore_ascii_case("host")).map(|(_, host)| host.trim()).peekable();
+        let fields: Vec<(&str, &str)> = fields.map(|(name, value)| (name, value.trim())).collect();
+        let called = |wanted: &'static str| {
+            fields.iter().filter(move |(name, _)| name.eq_ignore_ascii_case(wanted)).map(|(_, value)| *value)
+        };
+        let mut hosts = called("host").peekable();
         if hosts.peek().is_none() || !hosts.all(is_this_machine) {
             return Self::Foreign;
         }
         let path = target.split(['?', '#']).next().unwrap_or_default().to_owned();
-        if method == "HEAD" { Self::Head { path } } else { Self::Get { path } }
+        match method {
+            "HEAD" => Self::Head { path },
+            _ => Self::Get { path, range: called("range").next().and_then(ByteRange::parse) },
+        }
+    }
+}
+
+/// A single range of bytes (RFC 9110, section 14.1.2).
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) enum ByteRange {
+    /// From a byte on, to another or to the end.
+    From(u64, Option<u64>),
+    /// So many at the end.
+    Last(u64),
+}
+
+impl ByteRange {
+    fn parse(text: &str) -> Option<Self> {
+        let (from, to) = text.strip_prefix("bytes=")?.split_once('-')?;
+        match (from.is_empty(), to.is_empty()) {
+            (true, _) => to.parse().ok().map(Self::Last),
+            (false, true) => Some(Self::From(from.parse().ok()?, None)),
+            (false, false) => {
+                let (from, to): (u64, u64) = (from.parse().ok()?, to.parse().ok()?);
+                (from <= to).then_some(Self::From(from, Some(to)))
+            }
+        }
+    }
+
+    /// Its bytes of a content of this length; `None` where there are none.
+    pub(super) fn within(self, length: u64) -> Option<Range<u64>> {
+        let range = match self {
+            Self::From(from, to) => from..to.map_or(length, |to| to.saturating_add(1).min(length)),
+            Self::Last(count) => length.saturating_sub(count)..length,
+        };
+        (range.start < range.end).then_some(range)
     }
 }
 
@@ -59,7 +101,7 @@ mod tests {
     #[test]
     fn requests_are_read_and_foreign_hosts_refused() {
         let parse = |text: &str| Request::parse(text.as_bytes());
-        let get = |path: &str| Request::Get { path: path.to_owned() };
+        let get = |path: &str| Request::Get { path: path.to_owned(), range: None };
         assert_eq!(parse("GET /scene.l4gs?version=3 HTTP/1.1\r\nHost: 127.0.0.1:4000\r\n\r\n"), get("/scene.l4gs"));
         assert_eq!(parse("GET / HTTP/1.1\r\nhost:localhost\r\n\r\n"), get("/"));
         for foreign in ["evil.example:4000", "127.0.0.1.evil.example", "localhost\r\nHost: evil.example", ""] {

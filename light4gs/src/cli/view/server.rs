@@ -8,45 +8,12 @@ use std::net::{Ipv4Addr, SocketAddr, TcpListener, TcpStream};
 use std::sync::Arc;
 use std::time::Duration;
 
+use super::body::Body;
 use super::connections::{Connection, Connections, NoHead};
 use super::request::Request;
 
 /// Before the next attempt, where the system gives no connection: it has no descriptors left.
 const PAUSE: Duration = Duration::from_millis(10);
-
-/// The content of an answer. A scene is there once, for all who read it.
-#[derive(Clone, Debug)]
-pub(super) enum Body {
-    Fixed(&'static [u8]),
-    Shared(Arc<Vec<u8>>),
-}
-
-impl From<&'static str> for Body {
-    fn from(text: &'static str) -> Self {
-        Self::Fixed(text.as_bytes())
-    }
-}
-
-impl From<Arc<Vec<u8>>> for Body {
-    fn from(bytes: Arc<Vec<u8>>) -> Self {
-        Self::Shared(bytes)
-    }
-}
-
-impl From<String> for Body {
-    fn from(text: String) -> Self {
-        Self::Shared(Arc::new(text.into_bytes()))
-    }
-}
-
-impl AsRef<[u8]> for Body {
-    fn as_ref(&self) -> &[u8] {
-        match self {
-            Self::Fixed(bytes) => bytes,
-            Self::Shared(bytes) => bytes,
-        }
-    }
-}
 
 /// The answer for a path.
 #[derive(Clone, Debug)]
@@ -106,8 +73,8 @@ impl Server {
 /// Answers one request.
 fn serve(connection: &Connection, policy: &str, respond: &dyn Fn(&str) -> Option<Answer>) {
     let request = connection.read_head().map(|head| Request::parse(&head));
-    let (status, Answer { content_type, body }) = match &request {
-        Ok(Request::Get { path } | Request::Head { path }) => match respond(path) {
+    let (mut status, Answer { content_type, body }) = match &request {
+        Ok(Request::Get { path, .. } | Request::Head { path }) => match respond(path) {
             Some(answer) => ("200 OK", answer),
             None => ("404 Not Found", text("There is nothing at this address.")),
         },
@@ -117,16 +84,38 @@ fn serve(connection: &Connection, policy: &str, respond: &dyn Fn(&str) -> Option
         Err(NoHead::TooLate) => ("408 Request Timeout", text("The head of the request has not come in time.")),
         Err(NoHead::Gone) => return,
     };
-    let body = body.as_ref();
+    let missing = text("The file cannot be read.").body;
+    let mut body = body.open().unwrap_or_else(|_| {
+        status = "404 Not Found";
+        missing.open().expect("a text can be opened")
+    });
+    let whole = 0..body.len();
+    let mut sent = whole.clone();
+    let mut range = String::new();
+    if let (Ok(Request::Get { range: Some(asked), .. }), "200 OK") = (&request, status) {
+        match asked.within(body.len()) {
+            Some(part) => {
+                status = "206 Partial Content";
+                range = format!("Content-Range: bytes {}-{}/{}\r\n", part.start, part.end - 1, body.len());
+                sent = part;
+            }
+            None => {
+                status = "416 Range Not Satisfiable";
+                range = format!("Content-Range: bytes */{}\r\n", body.len());
+                sent = 0..0;
+            }
+        }
+    }
     let head = format!(
-        "HTTP/1.1 {status}\r\nContent-Type: {content_type}\r\nContent-Length: {}\r\nCache-Control: no-store\r\n\
+        "HTTP/1.1 {status}\r\nContent-Type: {content_type}\r\nContent-Length: {}\r\n{range}Accept-Ranges: bytes\r\n\
+         Cache-Control: no-store\r\n\
          Content-Security-Policy: {policy}\r\nReferrer-Policy: no-referrer\r\nX-Content-Type-Options: nosniff\r\n\
          Cross-Origin-Resource-Policy: same-origin\r\nConnection: close\r\n\r\n",
-        body.len()
+        sent.end - sent.start
     );
     let sent = connection.send(head.as_bytes()).and_then(|()| match request {
         Ok(Request::Head { .. }) => Ok(()),
-        _ => connection.send(body),
+        _ => body.send(sent, connection),
     });
     // The others have gone away.
     if sent.is_ok() {
@@ -182,6 +171,45 @@ mod tests {
     }
 
     const GET: &str = "GET / HTTP/1.1\r\nHost: localhost\r\n\r\n";
+
+    #[test]
+    fn ranges_of_bytes_and_of_files_are_sent_alone() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("take.l4gs");
+        std::fs::write(&path, (0..200_000_u32).map(|byte| byte as u8).collect::<Vec<_>>()).unwrap();
+        let server = Server::bind(0, "default-src 'none'").unwrap();
+        let address = server.address().unwrap();
+        let body = Body::File(path.as_path().into());
+        std::thread::spawn(move || {
+            server.run(move |path| match path {
+                "/text" => Some(text("hello")),
+                "/file" => Some(Answer { content_type: "x/y", body: body.clone() }),
+                "/gone" => Some(Answer { content_type: "x/y", body: Body::File(std::path::Path::new("/gone").into()) }),
+                _ => None,
+            });
+        });
+        let ask = |path: &str, range: &str| {
+            let head = format!("GET {path} HTTP/1.1\r\nHost: localhost\r\nRange: {range}\r\n\r\n");
+            let mut answer = Vec::new();
+            send(address, &head).read_to_end(&mut answer).unwrap();
+            let end = answer.windows(4).position(|mark| mark == b"\r\n\r\n").unwrap() + 4;
+            (String::from_utf8(answer[..end].to_vec()).unwrap(), answer[end..].to_vec())
+        };
+        let (head, body) = ask("/text", "bytes=1-3");
+        assert!(head.starts_with("HTTP/1.1 206") && head.contains("Content-Range: bytes 1-3/5\r\n"), "{head}");
+        assert_eq!(body, b"ell");
+        let (head, body) = ask("/file", "bytes=100000-");
+        assert!(head.contains("Content-Range: bytes 100000-199999/200000\r\n"), "{head}");
+        assert!(body.len() == 100_000 && body.iter().zip(100_000_u32..).all(|(found, byte)| *found == byte as u8));
+        assert_eq!(ask("/file", "bytes=-2").1, [199_998_u32 as u8, 199_999_u32 as u8]);
+        assert!(ask("/file", "bytes=200000-").0.starts_with("HTTP/1.1 416"));
+        // What is no single range is answered with the whole.
+        for other in ["bytes=3-1", "bytes=0-1,4-5", "lines=1-2", "bytes=-", "bytes=x-"] {
+            let (head, body) = ask("/text", other);
+            assert!(head.starts_with("HTTP/1.1 200") && body == b"hello", "{other}: {head}");
+        }
+        assert!(ask("/gone", "bytes=0-").0.starts_with("HTTP/1.1 404"));
+    }
 
     #[test]
     fn a_server_answers_on_this_machine() {

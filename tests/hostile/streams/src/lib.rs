@@ -13,6 +13,7 @@
 //! | `mutations.rs` | changes to them |
 //! | `bombs.rs` | streams that promise much with few bytes |
 //! | `transfers.rs` | streams that come in pieces, cut anywhere and resumed anywhere |
+//! | `takes.rs` | takes with a changed index |
 //! | `watch.rs` | memory, time and panics of one decoding |
 
 mod bombs;
@@ -20,6 +21,7 @@ mod mutations;
 pub mod parts;
 mod random;
 mod sound;
+pub mod takes;
 pub mod transfers;
 pub mod watch;
 

@@ -16,9 +16,10 @@ pub const MOST_BYTES: usize = 256 << 20;
 pub const MOST_TIME: Duration = Duration::from_secs(2);
 
 thread_local! {
-    /// Bytes that this thread has allocated and not freed, and the largest number of them so far.
-    static USED: Cell<usize> = const { Cell::new(0) };
-    static MOST: Cell<usize> = const { Cell::new(0) };
+    /// Bytes that this thread has allocated and not freed, and the largest number of them so far. A thread may free what another
+    /// one has allocated, so the number can be below zero.
+    static USED: Cell<isize> = const { Cell::new(0) };
+    static MOST: Cell<isize> = const { Cell::new(0) };
 }
 
 /// Counts the memory of each thread. A program makes it its global allocator.
@@ -27,13 +28,13 @@ pub struct CountingAllocator;
 
 fn taken(bytes: usize) {
     USED.with(|used| {
-        used.set(used.get().wrapping_add(bytes));
+        used.set(used.get().wrapping_add_unsigned(bytes));
         MOST.with(|most| most.set(most.get().max(used.get())));
     });
 }
 
 fn given_back(bytes: usize) {
-    USED.with(|used| used.set(used.get().wrapping_sub(bytes)));
+    USED.with(|used| used.set(used.get().wrapping_sub_unsigned(bytes)));
 }
 
 // SAFETY: every call is passed to the system's allocator unchanged. The counters are plain cells of the thread. They
@@ -127,7 +128,12 @@ impl Decoder {
         MOST.set(before);
         let begin = processor_time();
         let answer = catch_unwind(AssertUnwindSafe(|| self.pool.install(work)));
-        Outcome { answer: answer.ok(), time: processor_time() - begin, bytes: MOST.get() - before, wrong: None }
+        Outcome {
+            answer: answer.ok(),
+            time: processor_time() - begin,
+            bytes: (MOST.get() - before).unsigned_abs(),
+            wrong: None,
+        }
     }
 }
 

@@ -1,7 +1,12 @@
 //! A short run of hostile streams: the long one is `cargo run --release -p light4gs-hostile`.
 
+use light4gs_codec::{
+    Limits, SceneData, encode,
+    take::{NewSegment, SegmentTimes, Take, TakeMeta, write_take},
+};
 use light4gs_hostile::{
     Inputs,
+    takes::Takes,
     transfers::Transfers,
     watch::{CountingAllocator, Decoder},
 };
@@ -39,4 +44,36 @@ fn some_thousand_transfers_give_an_error_or_the_right_picture() {
         decoded += u64::from(matches!(outcome.answer, Some(Ok(()))));
     }
     assert!((INPUTS / 10..INPUTS / 2).contains(&decoded), "{decoded} decoded");
+}
+
+#[test]
+fn some_thousand_takes_within_the_promises() {
+    let (takes, decoder) = (Takes::new(16), Decoder::on_this_thread());
+    let mut decoded = 0;
+    let mut most_bytes = 0;
+    for number in 0..INPUTS {
+        let (kind, bytes) = takes.take(number);
+        let outcome = Takes::run(&bytes, &decoder);
+        let fault = outcome.fault();
+        assert!(fault.is_none(), "seed 16, take {number} ({kind}, {} bytes): {fault:?}, {outcome:?}", bytes.len());
+        decoded += u64::from(matches!(outcome.answer, Some(Ok(()))));
+        most_bytes = most_bytes.max(outcome.bytes);
+    }
+    println!("{decoded} of {INPUTS} decoded, at most {} MiB", most_bytes >> 20);
+    assert!((INPUTS / 50..INPUTS / 2).contains(&decoded), "{decoded} decoded");
+}
+
+/// As many segments as the limits allow: SECURITY.md says in which memory their index is read.
+#[test]
+fn the_longest_index_is_read_within_its_promise() {
+    let still = encode(&SceneData::default()).expect("sound");
+    let segment = |number: u32| {
+        let begin = f64::from(number);
+        let times = SegmentTimes { begin, end: begin + 1.0, stream_begin: begin, stream_end: begin + 1.0, frames: 0 };
+        NewSegment { times, stream: still.clone(), hidden: Vec::new() }
+    };
+    let segments: Vec<NewSegment> = (0..100_000).rev().map(segment).collect();
+    let bytes = write_take(&TakeMeta::default(), &still, &segments, 0).expect("sound");
+    let outcome = Decoder::on_this_thread().watch(|| Take::read(bytes, &Limits::default()).map(drop));
+    assert!(matches!(outcome.answer, Some(Ok(()))) && outcome.bytes < 32 << 20, "{outcome:?}");
 }

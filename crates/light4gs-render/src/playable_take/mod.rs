@@ -1,0 +1,186 @@
+//! A take that can be computed and drawn at any time.
+
+#[cfg(test)]
+mod tests;
+
+use std::sync::{Arc, Mutex, PoisonError};
+
+use light4gs_codec::{
+    CodecError, GaussianArrays, Limits,
+    take::{SegmentTimes, Take, TakeSegment, drawn_together},
+};
+use light4gs_data::Camera;
+
+use crate::playable::PlayableScene;
+
+/// Segments that are kept decoded unless a program asks for another number: the one that is shown, and those beside it.
+const KEPT: usize = 3;
+
+/// A take: minutes that can be computed and drawn at any time.
+///
+/// The base is decoded once. Segments are decoded when they are needed, and the last three that were used are kept, or as many
+/// as [`PlayableTake::keeping`] says. All methods take `&self`, and several threads may call them at once; while one of
+/// them decodes a segment, the others wait.
+///
+/// ```no_run
+/// use light4gs_codec::Limits;
+/// use light4gs_data::Camera;
+/// use light4gs_render::PlayableTake;
+///
+/// let take = PlayableTake::open("take.l4gs".as_ref(), &Limits::default())?;
+/// let camera = Camera::look_at([0.0, -4.0, 0.0].into(), [0.0; 3].into(), [0.0, 0.0, 1.0].into(), 0.7, 400, 300);
+/// let image = take.render(&camera, 75.0, take.base().info().meta.background)?; // a minute and a quarter after the begin
+/// assert_eq!(image.len(), 300 * 400 * 3);
+/// # Ok::<(), light4gs_codec::CodecError>(())
+/// ```
+#[derive(Debug)]
+pub struct PlayableTake {
+    take: Take,
+    base: PlayableScene,
+    limits: Limits,
+    most: usize,
+    /// Decoded segments by their numbers, the one that was used last at the end.
+    decoded: Mutex<Vec<(usize, Arc<Shown>)>>,
+}
+
+/// A decoded segment, and what it hides.
+#[derive(Debug)]
+struct Shown {
+    times: SegmentTimes,
+    scene: PlayableScene,
+    hidden: Vec<bool>,
+}
+
+impl PlayableTake {
+    /// A take whose index has been read. Its base is decoded.
+    ///
+    /// # Errors
+    /// As [`PlayableScene::decode`] for the base; a base that moves, or that has another number of Gaussians than the take says;
+    /// what the system refuses.
+    pub fn new(take: Take, limits: &Limits) -> Result<Self, CodecError> {
+        let base = PlayableScene::decode(&take.base()?, limits).map_err(|error| of_part("base".into(), error))?;
+        take.index().check_base(base.info())?;
+        Ok(Self { take, base, limits: *limits, most: KEPT, decoded: Mutex::new(Vec::new()) })
+    }
+
+    /// A take in memory.
+    ///
+    /// # Errors
+    /// As [`Take::read`] and [`PlayableTake::new`].
+    pub fn decode(bytes: Vec<u8>, limits: &Limits) -> Result<Self, CodecError> {
+        Self::new(Take::read(bytes, limits)?, limits)
+    }
+
+    /// A take in a file, of which the index and the base are read. Not in a browser, which has none.
+    ///
+    /// # Errors
+    /// As [`Take::open`] and [`PlayableTake::new`].
+    #[cfg(not(target_os = "unknown"))]
+    pub fn open(path: &std::path::Path, limits: &Limits) -> Result<Self, CodecError> {
+        Self::new(Take::open(path, limits)?, limits)
+    }
+
+    /// The same, with another number of segments that are kept decoded; at least one is.
+    pub fn keeping(self, most: usize) -> Self {
+        Self { most: most.max(1), ..self }
+    }
+
+    /// The file: its metadata, and when its segments are shown.
+    pub fn take(&self) -> &Take {
+        &self.take
+    }
+
+    /// What stands still over the whole take.
+    pub fn base(&self) -> &PlayableScene {
+        &self.base
+    }
+
+    /// Numbers of the segments that are decoded, the one that was used last at the end.
+    pub fn decoded(&self) -> Vec<usize> {
+        let decoded = self.decoded.lock().unwrap_or_else(PoisonError::into_inner);
+        decoded.iter().map(|(number, _)| *number).collect()
+    }
+
+    /// Decodes the segment that is shown at a time in seconds, so that it is there when it is needed: for a thread that runs
+    /// ahead of the player. Nothing happens where no segment is shown.
+    ///
+    /// # Errors
+    /// As [`PlayableTake::at`].
+    pub fn prepare(&self, seconds: f64) -> Result<(), CodecError> {
+        self.segment_at(seconds).map(|_| ())
+    }
+
+    /// The Gaussians at a time of the take in seconds, before their activations: those of the base that are not hidden, then
+    /// those of the segment, as [`drawn_together`] puts them; those of the base alone where no segment is shown. To the bit the
+    /// same on every machine. Takes one thread, and more to decode a segment.
+    ///
+    /// # Errors
+    /// A time that is NaN or infinite; a segment that is damaged; what the system refuses.
+    pub fn at(&self, seconds: f64) -> Result<GaussianArrays, CodecError> {
+        self.gaussians(seconds, self.segment_at(seconds)?.as_deref())
+    }
+
+    /// An image `[height, width, 3]` of the take at a time in seconds: red, green, blue over the background, 0 or more and not
+    /// clamped above. Takes the threads of rayon's current pool; the numbers do not depend on how many there are.
+    ///
+    /// # Errors
+    /// As [`PlayableTake::at`]; for the size of the image and its memory as [`PlayableScene::render`].
+    pub fn render(&self, camera: &Camera, seconds: f64, background: [f32; 3]) -> Result<Vec<f32>, CodecError> {
+        let shown = self.segment_at(seconds)?;
+        let (mut allowance, mut count, mut numbers) = (self.base.allowance(), self.base.len(), self.base.numbers());
+        if let Some(shown) = &shown {
+            allowance = allowance.max(shown.scene.allowance());
+            count += shown.scene.len();
+            // Harmonics are padded to the larger degree: at most as many as the wider of the two would have for all.
+            let width = |scene: &PlayableScene| scene.numbers().div_ceil(scene.len().max(1));
+            numbers = count * width(&self.base).max(width(&shown.scene));
+        }
+        allowance.image(camera, background, (count, numbers), || self.gaussians(seconds, shown.as_deref()))
+    }
+
+    fn gaussians(&self, seconds: f64, shown: Option<&Shown>) -> Result<GaussianArrays, CodecError> {
+        let base = self.base.canonical();
+        let Some(Shown { times, scene, hidden }) = shown else { return Ok(drawn_together(base, &[], None)) };
+        let moved = scene.at(times.stream_time(seconds))?;
+        Ok(drawn_together(base, hidden, Some(&moved)))
+    }
+
+    /// The segment that is shown at a time, decoded.
+    fn segment_at(&self, seconds: f64) -> Result<Option<Arc<Shown>>, CodecError> {
+        if !seconds.is_finite() {
+            return Err(CodecError::Invalid {
+                section: "rendering",
+                field: "time".into(),
+                found: seconds.to_string(),
+                expected: "a finite number of seconds".into(),
+            });
+        }
+        let Some(number) = self.take.segment_at(seconds) else { return Ok(None) };
+        // Held while a segment is decoded, so that no two threads decode the same one.
+        let mut decoded = self.decoded.lock().unwrap_or_else(PoisonError::into_inner);
+        let found = decoded.iter().position(|(other, _)| *other == number);
+        let entry = match found {
+            Some(at) => decoded.remove(at),
+            None => {
+                // Before the next one is decoded, so that there are never more.
+                let surplus = (decoded.len() + 1).saturating_sub(self.most);
+                decoded.drain(..surplus);
+                (number, Arc::new(self.decode_segment(number)?))
+            }
+        };
+        let shown = entry.1.clone();
+        decoded.push(entry);
+        Ok(Some(shown))
+    }
+
+    fn decode_segment(&self, number: usize) -> Result<Shown, CodecError> {
+        let TakeSegment { times, stream, hidden } = self.take.segment(number)?;
+        let scene = PlayableScene::decode(&stream, &self.limits);
+        Ok(Shown { times, scene: scene.map_err(|error| of_part(format!("segment {number}"), error))?, hidden })
+    }
+}
+
+/// An error of a stream of the take.
+fn of_part(part: String, error: CodecError) -> CodecError {
+    CodecError::InTake { part, error: Box::new(error) }
+}

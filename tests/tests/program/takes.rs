@@ -1,0 +1,126 @@
+//! Takes: a base and segments in one file, trained in parts, killed, joined, measured.
+
+use std::fs;
+use std::process::Command;
+use std::time::Duration;
+
+use crate::PROGRAM;
+use light4gs_codec::Limits;
+use light4gs_codec::take::Take;
+use light4gs_tests::program::{TINY, TINY_COMPRESSION, Workspace, assert_refused, assert_success};
+use serde_json::Value;
+
+/// Three seconds of a rig, ten frames a second.
+fn filmed() -> Workspace {
+    let w = Workspace::new(PROGRAM);
+    let options = ["--seconds", "3", "--cameras", "3", "--fps", "10", "--width", "48", "--height", "36"];
+    assert_success(&w.command(["synth", "rig"]).args(options).output().unwrap());
+    w
+}
+
+fn train(w: &Workspace, run: &str, more: &[&str]) -> Command {
+    let mut command = w.command(["train", "rig", "--config", "dnerf-cpu", "--segment", "1", "--out", run, "--quiet"]);
+    let keys =
+        TINY.into_iter().chain(TINY_COMPRESSION).chain(["model.field=nodes", "data.resolution=0", "device=flex"]);
+    for key in keys {
+        command.args(["--set", key]);
+    }
+    command.args(more);
+    command
+}
+
+#[test]
+fn a_take_is_trained_in_parts_and_plays_as_one_file() {
+    let w = filmed();
+    assert_success(&train(&w, "take", &["--jobs", "2"]).output().unwrap());
+    let file = w.path("take/take.l4gs");
+    let bytes = fs::read(&file).unwrap();
+    let take = Take::read(bytes.clone(), &Limits::default()).unwrap();
+    let times: Vec<_> = take.index().segments().iter().map(|segment| segment.times).collect();
+    assert_eq!(times.len(), 3);
+    assert_eq!(times.iter().map(|times| times.frames).sum::<u32>(), 30);
+    assert!((take.meta().seconds - 2.9).abs() < 1e-6 && (take.meta().fps - 10.0).abs() < 1e-4);
+    for pair in times.windows(2) {
+        assert_eq!(pair[0].end, pair[1].begin);
+        assert!(pair[0].stream_end > pair[0].end && pair[1].stream_begin < pair[1].begin);
+    }
+    // Every segment is an ordinary stream, and the base stands still.
+    for number in 0..3 {
+        light4gs_codec::decode(&take.segment(number).unwrap().stream).unwrap();
+    }
+    assert!(light4gs_codec::decode(&take.base().unwrap()).unwrap().motion.kind.is_empty());
+
+    // The same command has nothing left to do; joining gives the same file.
+    assert_success(&train(&w, "take", &[]).output().unwrap());
+    assert_success(&w.command(["join", "take"]).output().unwrap());
+    assert_eq!(fs::read(&file).unwrap(), bytes);
+
+    let info: Value =
+        serde_json::from_slice(&w.command(["info", "take/take.l4gs", "--json"]).output().unwrap().stdout).unwrap();
+    assert_eq!(info["segments"].as_array().unwrap().len(), 3);
+    let output = w.command(["eval", "take", "--json"]).output().unwrap();
+    assert_success(&output);
+    let scores: Value = serde_json::from_slice(&output.stdout).unwrap();
+    assert_eq!(scores["frames"].as_array().unwrap().len(), 30, "the frames of the test camera");
+    assert_eq!(scores["bytes"].as_u64().unwrap(), bytes.len() as u64);
+    let crossing = scores["frames"].as_array().unwrap().iter().filter(|frame| frame["crosses_join"] == true).count();
+    assert_eq!(crossing, 2);
+    assert!(scores["flicker"]["at_joins"].as_f64().unwrap() > 0.0);
+    assert!(fs::read_to_string(w.path("take/report.html")).unwrap().contains("Flicker"));
+}
+
+#[test]
+fn a_take_that_is_killed_ends_with_the_same_bytes() {
+    let w = filmed();
+    assert_success(&train(&w, "whole", &[]).output().unwrap());
+    let expected = fs::read(w.path("whole/take.l4gs")).unwrap();
+    let mut kills = 0;
+    for attempt in 1..200 {
+        let mut child = train(&w, "killed", &[]).spawn().unwrap();
+        std::thread::sleep(Duration::from_millis(60 * attempt));
+        match child.try_wait().unwrap() {
+            Some(status) => {
+                assert!(status.success());
+                break;
+            }
+            None => {
+                child.kill().unwrap();
+                child.wait().unwrap();
+                kills += 1;
+            }
+        }
+    }
+    assert!(kills > 3, "{kills} kills");
+    assert_eq!(fs::read(w.path("killed/take.l4gs")).unwrap(), expected, "after {kills} kills");
+}
+
+#[test]
+fn the_first_part_plays_before_the_rest_is_trained() {
+    let w = filmed();
+    assert_success(&train(&w, "take", &[]).output().unwrap());
+    fs::remove_dir_all(w.path("take/segments/0001")).unwrap();
+    fs::remove_dir_all(w.path("take/segments/0002")).unwrap();
+    assert_success(&w.command(["join", "take"]).output().unwrap());
+    let take = Take::read(fs::read(w.path("take/take.l4gs")).unwrap(), &Limits::default()).unwrap();
+    assert_eq!((take.len(), take.segment_at(0.5), take.segment_at(1.5)), (1, Some(0), None));
+    let output = w.command(["eval", "take", "--json"]).output().unwrap();
+    assert_success(&output);
+    let scores: Value = serde_json::from_slice(&output.stdout).unwrap();
+    assert_eq!(scores["frames"].as_array().unwrap().len(), 10, "frames that no segment shows are left out");
+}
+
+#[test]
+fn what_is_no_take_is_refused_with_a_remedy() {
+    let w = filmed();
+
+    assert_refused(&w.command(["join", "rig"]).output().unwrap(), &["take.json"]);
+    let jobs = w.command(["train", "rig", "--out", "x", "--jobs", "2"]).output().unwrap();
+    assert_refused(&jobs, &["--jobs", "--segment"]);
+    let target = train(&w, "x", &["--target-bytes", "100k"]).output().unwrap();
+    assert_refused(&target, &["--target-bytes", "--segment"]);
+    // A scene whose time is not known.
+    assert_success(&w.command(["synth", "plain", "--resolution", "32", "--train-frames", "12"]).output().unwrap());
+    let unknown = w.command(["train", "plain", "--segment", "1", "--out", "y", "--device", "flex"]).output().unwrap();
+    assert_refused(&unknown, &["data.frames_a_second"]);
+    assert!(!w.path("y").exists() && !w.path("x").exists());
+}
