@@ -47,7 +47,7 @@ pub(crate) fn describe_error(error: &CodecError) -> String {
         CodecError::NewerVersion { .. }
         | CodecError::UnknownKind { .. }
         | CodecError::UnknownEncoding { .. }
-        // This player plays streams only.
+        // A take within a take.
         | CodecError::IsTake => "newer",
         CodecError::OverLimit { .. } => "too-large",
         _ => "damaged",

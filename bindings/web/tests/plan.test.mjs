@@ -5,7 +5,7 @@ import { test } from "node:test";
 import { MOST_DECODED, placeAt, plan } from "../player/take/plan.js";
 
 /** Segments of these begins and ends. */
-const placesOf = (...times) => times.map(([begin, end], k) => ({ begin, end, first: 100 * k, last: 100 * k + 100, checksum: 0 }));
+const placesOf = (...times) => times.map(([begin, end], k) => ({ begin, end, first: 100 * k, last: 100 * k + 100 }));
 const seconds = (count) => placesOf(...Array.from({ length: count }, (_, k) => [k, k + 1]));
 const begins = (places) => places.map(({ begin }) => begin);
 const once = { loop: false, duration: 10 };

@@ -374,7 +374,8 @@ test("a hostile front is refused before memory is taken", async () => {
 });
 
 test("a take that grows is followed, and the time stays", async () => {
-  const states = makeGrowing();
+  // The last state is written anew: the index is longer, and all bytes are elsewhere.
+  const states = [...makeGrowing(), makeTake(6)];
   const served = serveTake(states[0], { step: Infinity });
   let version = 1;
   files["state.json"] = (response) => response.end(JSON.stringify({ scene: version, status: "" }));
@@ -397,7 +398,7 @@ test("a take that grows is followed, and the time stays", async () => {
     await page.waitForFunction((count) => globalThis.element.player.scene.segments.places.length === count, k + 2);
     const at = await page.evaluate(() => globalThis.element.player.time * globalThis.element.player.scene.duration);
     assert.ok(Math.abs(at - (k + 0.5)) < 1e-6, `${at}`);
-    assert.equal((await facts()).color, ["blue", "yellow", "cyan"][k - 1]);
+    assert.equal((await facts()).color, ["blue", "yellow", "cyan", "magenta"][k - 1]);
   }
   // Another file in its place is loaded anew.
   served.bytes = take;

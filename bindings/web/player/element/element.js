@@ -195,7 +195,10 @@ export class L4gsPlayer extends (globalThis.HTMLElement ?? class {}) {
       if (loading !== this.#loading) return scene.close();
       const still = matchMedia("(prefers-reduced-motion: reduce)").matches;
       const playing = before ? before.playing : this.hasAttribute("autoplay") && !still && scene.info.moves;
-      const { time, speed = 1, background, camera, home, following = false } = before ?? {};
+      const { speed = 1, background, camera, home, following = false } = before ?? {};
+      // Of a take the second stays, of a scene the share of its length.
+      const grown = before && scene instanceof Take ? before.scene.duration / scene.duration : 1;
+      const time = before ? before.time * grown : undefined;
       const flying = before?.controls?.flying ?? false;
       const chosen = before ? this.find("camera").value : "free";
       this.#end();

@@ -6,7 +6,6 @@
  * @property {number} end  the second at which it is not shown any more
  * @property {number} first  where its bytes begin in the file
  * @property {number} last  where they end
- * @property {number} checksum  of them
  */
 
 /** Seconds ahead whose segments are loaded. */

@@ -58,10 +58,11 @@ export class Segments {
    * @param {import("./take.js").Index} index @param {Uint8Array[]} ranges  from which it was read @param {number} length  of the file
    */
   setIndex({ segments }, ranges, length) {
-    const before = new Map(this.places.map((place) => [JSON.stringify(place), place]));
-    this.places = segments.map(([begin, end, first, last, checksum]) => {
-      const place = { begin, end, first, last, checksum };
-      return before.get(JSON.stringify(place)) ?? place;
+    const before = new Map(this.places.map((place) => [place.begin, place]));
+    this.places = segments.map(([begin, end, first, last]) => {
+      // Its bytes may be elsewhere in the file now.
+      const place = before.get(begin) ?? { begin, end, first, last };
+      return Object.assign(place, { first, last });
     });
     // They may be well now.
     this.failed.clear();

@@ -15,7 +15,7 @@ import { Segments } from "./segments.js";
  * @property {number} fps  0 where not known
  * @property {number} seconds
  * @property {[number, number]} base  where its bytes begin and end
- * @property {[number, number, number, number, number][]} segments  begin and end in seconds, and in bytes of the file, checksum
+ * @property {[number, number, number, number][]} segments  begin and end in seconds, and in bytes of the file
  * @property {Record<string, string>} extra
  */
 

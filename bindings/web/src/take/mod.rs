@@ -44,15 +44,16 @@ impl OpenTake {
         Self { index, base: None, segments: Vec::new(), shown: None, list: DrawList::default() }
     }
 
-    /// Takes the index of a file that may have grown: all that was there is still there. Another index is not taken. Returns
-    /// whether it was.
+    /// Takes the index of a take that may have grown: all that was there is still there, be it at another place of a file that was
+    /// written anew. Another index is not taken. Returns whether it was.
     pub fn grow(&mut self, index: TakeIndex) -> bool {
         let begin_of = |place: &SegmentPlace| place.times.begin;
         let is_there = |place: &SegmentPlace| {
             let found = index.segments().binary_search_by(|other| begin_of(other).total_cmp(&begin_of(place)));
-            found.is_ok_and(|number| index.segments()[number] == *place)
+            found.is_ok_and(|number| SegmentPlace { offset: place.offset, ..index.segments()[number] } == *place)
         };
-        let same_base = (index.base(), index.base_gaussians()) == (self.index.base(), self.index.base_gaussians());
+        let base_of = |index: &TakeIndex| (index.base().end - index.base().start, index.base_gaussians());
+        let same_base = base_of(&index) == base_of(&self.index);
         let grown = same_base && self.index.segments().iter().all(is_there);
         if grown {
             self.index = index;

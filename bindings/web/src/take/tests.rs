@@ -78,7 +78,7 @@ fn a_segment_stays_where_the_take_grows_and_another_take_is_not_taken() {
     let file = take();
     let mut open = opened(&file, &[1]);
     let index_of = |segments: &[NewSegment]| {
-        let bytes = write_take(&TakeMeta::default(), &balls(&[5.0, 2.0]), segments, 4 - segments.len() as u32);
+        let bytes = write_take(&TakeMeta::default(), &balls(&[5.0, 2.0]), segments, 5);
         Take::read(bytes.expect("a take"), &take_limits()).expect("a take").index().clone()
     };
     let [first, second] =

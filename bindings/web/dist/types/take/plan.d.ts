@@ -15,10 +15,6 @@ export type Place = {
      * where they end
      */
     last: number;
-    /**
-     * of them
-     */
-    checksum: number;
 };
 /** Segments that are decoded at most: besides those ahead, the one that is shown and one behind. */
 export declare const MOST_DECODED: number;

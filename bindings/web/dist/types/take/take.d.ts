@@ -15,9 +15,9 @@ export type Index = {
      */
     base: [number, number];
     /**
-     * begin and end in seconds, and in bytes of the file, checksum
+     * begin and end in seconds, and in bytes of the file
      */
-    segments: [number, number, number, number, number][];
+    segments: [number, number, number, number][];
     extra: Record<string, string>;
 };
 export type RangedFile = {
