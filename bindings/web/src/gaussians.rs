@@ -88,7 +88,7 @@ pub(crate) fn pack(
     }
 }
 
-/// All attributes, activated, one behind the other: see [`OpenScene::attributes_at`](crate::OpenScene::attributes_at).
+/// All attributes, activated, one behind the other: centers, standard deviations, unit quaternions, opacities, harmonics.
 pub(crate) fn activated(gaussians: &GaussianArrays) -> Vec<f32> {
     let rest = gaussians.sh_rest.len() / gaussians.len().max(1);
     let mut attributes = Vec::with_capacity(gaussians.len() * (14 + rest));
