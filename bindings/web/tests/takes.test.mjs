@@ -422,7 +422,7 @@ test("the element shows seconds and what has come, and a slow connection makes t
     globalThis.element.player.play();
   });
   await page.waitForFunction(() => globalThis.element.player.time > 1.1 / 25);
-  const shade = await page.evaluate(() => [globalThis.element.find("time").style.backgroundImage, globalThis.waits]);
+  const shade = await page.evaluate(() => [globalThis.element.find("parts").style.backgroundImage, globalThis.waits]);
   assert.match(shade[0], /^linear-gradient\(to right, transparent 0.00%, var\(--accent\) 0.00% (8|12|16|20|24).00%, transparent/);
   assert.ok(shade[1] >= 1, "the time did not wait");
   await page.evaluate(() => globalThis.element.remove());

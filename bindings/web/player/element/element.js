@@ -251,7 +251,7 @@ export class L4gsPlayer extends (globalThis.HTMLElement ?? class {}) {
     if (player.controls) player.controls.wheelAlways = this.hasAttribute("page");
     this.layers.show("");
     this.find("bar").hidden = false;
-    for (const id of ["play", "time", "clock", "speed", "loop"]) this.find(id).hidden = !info.moves;
+    for (const id of ["play", "line", "clock", "speed", "loop"]) this.find(id).hidden = !info.moves;
     this.find("background").value = toHex(player.background);
     this.find("speed").value = String(player.speed);
     this.#nameCanvas();
@@ -276,7 +276,7 @@ export class L4gsPlayer extends (globalThis.HTMLElement ?? class {}) {
     if (!this.player) return;
     const { scene } = this.player;
     const { loaded, problems } = scene instanceof Take ? scene : { loaded: [], problems: [] };
-    shade(this.find("time"), loaded, scene.duration);
+    shade(this.find("parts"), loaded, scene.duration);
     this.#problem = problems.length > 0 ? `Cannot be shown: ${problems[problems.length - 1].message}` : "";
     this.#say(this.#status);
     this.#showTime();

@@ -2,11 +2,11 @@
 
 /**
  * Shades parts of the time line.
- * @param {HTMLInputElement} input
+ * @param {HTMLElement} element  as long as the line
  * @param {[number, number][]} parts  first and last second of each, one after the other
  * @param {number} duration  seconds
  */
-export function shade(input, parts, duration) {
+export function shade(element, parts, duration) {
   const at = (/** @type {number} */ seconds) => `${((100 * seconds) / duration).toFixed(2)}%`;
   /** Neighbors are one part: a take has many segments. @type {[number, number][]} */
   const joined = [];
@@ -16,5 +16,5 @@ export function shade(input, parts, duration) {
     else joined.push([begin, end]);
   }
   const stops = joined.flatMap(([begin, end]) => [`transparent ${at(begin)}`, `var(--accent) ${at(begin)} ${at(end)}`, `transparent ${at(end)}`]);
-  input.style.backgroundImage = stops.length > 0 ? `linear-gradient(to right, ${stops.join(", ")})` : "";
+  element.style.backgroundImage = stops.length > 0 ? `linear-gradient(to right, ${stops.join(", ")})` : "";
 }
