@@ -5,7 +5,9 @@ export { L4gsPlayer } from "./element/element.js";
 export { Follower } from "./scene/follower.js";
 export { Player } from "./player.js";
 export { GraphicsError, SceneError } from "./errors.js";
-export { Scene, dismiss, load, prepare } from "./scene/scene.js";
+export { Scene } from "./scene/scene.js";
+export { Take } from "./take/take.js";
+export { dismiss, load, prepare } from "./scene/load.js";
 export { SplatRenderer } from "./drawing/splat_renderer.js";
 export { baseColors } from "./scene/colors.js";
 

@@ -46,7 +46,7 @@ function isStretched(canvas) {
 }
 
 /**
- * Plays a {@link Scene} on a canvas. Events: `timechange`, `statechange` (playing, loop, speed), `camerachange`, `error`.
+ * Plays a scene or a take on a canvas. Events: `timechange`, `statechange` (playing, loop, speed, waiting), `camerachange`, `error`.
  */
 export class Player extends EventTarget {
   /** Memory of a list that is not needed any more. @type {ArrayBuffer | null} */
@@ -60,6 +60,8 @@ export class Player extends EventTarget {
   #last = 0;
   #time = 0;
   #playing = false;
+  /** Seconds of which the time is a share. */
+  #duration;
   #shownTime = -1;
   #shownFrom = "";
   /** The level of detail of the list that the renderer has. */
@@ -92,12 +94,15 @@ export class Player extends EventTarget {
     this.pixelRatio = options.pixelRatio;
     this.loop = options.loop ?? true;
     this.speed = 1;
+    /** Whether time stands still until more of a take has come. */
+    this.waiting = false;
     /** Whether the camera goes along the training path while time runs. */
     this.following = false;
     /** Red, green, blue in [0, 1]. @type {number[]} */
     this.background = [...scene.info.background];
     this.renderer = new SplatRenderer(canvas);
     this.#draft = new Draft(scene.info.levels);
+    this.#duration = scene.duration;
     this.camera = new Camera();
     this.home = this.camera.clone();
     this.camera.lens = sourceLens(scene.info);
@@ -112,9 +117,13 @@ export class Player extends EventTarget {
     scene.addEventListener("change", this.#more);
   }
 
-  /** More Gaussians of the scene have come. */
+  /** More Gaussians of the scene have come, or a take has grown. */
   #more = () => {
     this.#shownTime = -1;
+    // The second stays.
+    const { duration } = this.scene;
+    this.#time = Math.min(1, (this.#time * this.#duration) / duration);
+    this.#duration = duration;
     // With more Gaussians there are more levels, and other times.
     this.#draft = new Draft(this.scene.info.levels);
   };
@@ -253,7 +262,9 @@ export class Player extends EventTarget {
     const seconds = Math.min((now - this.#last) / 1000, 0.25);
     this.#last = now;
     if (!this.#visible) return;
+    this.scene.follow(this.#time, this.loop);
     if (this.#playing && seconds > 0) this.#advance(seconds);
+    else this.#wait(this.scene.waitsAt(this.#time));
     if (this.controls?.step(seconds)) {
       this.following = false;
       this.cameraMoved();
@@ -291,9 +302,9 @@ export class Player extends EventTarget {
     return this.#moment === this.#shownTime && this.#viewpointKey() === this.#shownFrom;
   }
 
-  /** The time; 0 if the scene does not move. */
+  /** The time as the scene counts it. */
   get #moment() {
-    return this.scene.info.moves ? this.#time : 0;
+    return this.scene.momentAt(this.#time);
   }
 
   /** Looks after the graphics card between animation frames: an image need not wait for the next one. */
@@ -332,12 +343,23 @@ export class Player extends EventTarget {
   /** @param {number} seconds */
   #advance(seconds) {
     const time = this.#time + (seconds * this.speed) / this.scene.duration;
+    const next = time < 1 ? time : this.loop ? time % 1 : 1;
+    // A moment that is not there yet is not jumped over.
+    this.#wait(this.scene.waitsAt(next));
+    if (this.waiting) return;
     if (time < 1) this.time = time;
-    else if (this.loop) this.time = time % 1;
+    else if (this.loop) this.time = next;
     else {
       this.time = 1;
       this.pause();
     }
+  }
+
+  /** @param {boolean} waiting */
+  #wait(waiting) {
+    if (waiting === this.waiting) return;
+    this.waiting = waiting;
+    this.dispatchEvent(new Event("statechange"));
   }
 
   #follow() {
@@ -452,6 +474,7 @@ export class Player extends EventTarget {
     this.pause();
     this.following = false;
     await this.ready;
+    await this.scene.ready(time);
     while (this.#busy) await new Promise((resolve) => setTimeout(resolve, 1));
     this.camera.take(view);
     this.time = time;

@@ -47,7 +47,7 @@ pub(crate) fn describe_error(error: &CodecError) -> String {
         CodecError::NewerVersion { .. }
         | CodecError::UnknownKind { .. }
         | CodecError::UnknownEncoding { .. }
-        // This player plays streams only.
+        // A take within a take.
         | CodecError::IsTake => "newer",
         CodecError::OverLimit { .. } => "too-large",
         _ => "damaged",
@@ -55,13 +55,13 @@ pub(crate) fn describe_error(error: &CodecError) -> String {
     format!("{{\"error\":{},\"message\":{}}}", text(kind), text(&error.to_string()))
 }
 
-fn list(items: impl IntoIterator<Item = impl Display>) -> String {
+pub(crate) fn list(items: impl IntoIterator<Item = impl Display>) -> String {
     let items: Vec<String> = items.into_iter().map(|item| item.to_string()).collect();
     format!("[{}]", items.join(","))
 }
 
 /// A JSON string.
-fn text(value: &str) -> String {
+pub(crate) fn text(value: &str) -> String {
     let mut quoted = String::from('"');
     for character in value.chars() {
         match character {

@@ -44,6 +44,25 @@ impl Viewpoint {
     }
 }
 
+/// Gaussians that are drawn, as computed last.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Drawn<'a> {
+    /// [`FLOATS`] numbers for each Gaussian.
+    pub(crate) packed: &'a [f32],
+    pub(crate) gaussians: &'a GaussianArrays,
+    /// Whether a Gaussian of the stream is not drawn; what the list does not have is drawn.
+    pub(crate) hidden: &'a [bool],
+    /// Which Gaussians of the stream they are; empty where they are all.
+    pub(crate) indices: &'a [u32],
+}
+
+impl Drawn<'_> {
+    fn is_hidden(&self, index: usize) -> bool {
+        let of_stream = self.indices.get(index).map_or(index, |&index| index as usize);
+        self.hidden.get(of_stream).copied().unwrap_or(false)
+    }
+}
+
 /// A list, and memory that is used again for the next one.
 #[derive(Debug, Default)]
 pub(crate) struct DrawList {
@@ -53,26 +72,30 @@ pub(crate) struct DrawList {
 }
 
 impl DrawList {
-    /// The Gaussians that a viewpoint sees, farthest first, of equal ones the later first. `packed` has [`FLOATS`] numbers
-    /// for each Gaussian.
-    pub(crate) fn make(&mut self, packed: &[f32], gaussians: &GaussianArrays, viewpoint: &Viewpoint) -> &[f32] {
+    /// The Gaussians that a viewpoint sees, farthest first, of equal ones the later first.
+    pub(crate) fn make(&mut self, parts: &[Drawn<'_>], viewpoint: &Viewpoint) -> &[f32] {
         let eye = viewpoint.eye;
         let all = viewpoint.spread == f32::INFINITY;
         self.keys.clear();
-        for (index, gaussian) in packed.chunks_exact(FLOATS).enumerate() {
-            let depth = viewpoint.depth([gaussian[0], gaussian[1], gaussian[2]]);
-            if depth > NEAR && gaussian[3] >= MIN_ALPHA && (all || viewpoint.sees(gaussian, depth)) {
-                // Depths are positive, so their bits sort as they do.
-                self.keys.push((depth.to_bits(), index as u32));
+        let mut begin = 0;
+        for part in parts {
+            for (index, gaussian) in part.packed.chunks_exact(FLOATS).enumerate() {
+                let depth = viewpoint.depth([gaussian[0], gaussian[1], gaussian[2]]);
+                let seen = depth > NEAR && gaussian[3] >= MIN_ALPHA && (all || viewpoint.sees(gaussian, depth));
+                if seen && !part.is_hidden(index) {
+                    // Depths are positive, so their bits sort as they do.
+                    self.keys.push((depth.to_bits(), begin + index as u32));
+                }
             }
+            begin += part.gaussians.len() as u32;
         }
         self.sort();
         self.entries.clear();
         self.entries.reserve(ENTRY * self.keys.len().next_multiple_of(ROW));
         for &(_, index) in self.keys.iter().rev() {
-            let index = index as usize;
-            let gaussian = &packed[FLOATS * index..][..FLOATS];
-            let color = seen_color(gaussians, index, std::array::from_fn(|axis| gaussian[axis] - eye[axis]));
+            let Some((part, index)) = find(parts, index as usize) else { continue };
+            let gaussian = &part.packed[FLOATS * index..][..FLOATS];
+            let color = seen_color(part.gaussians, index, std::array::from_fn(|axis| gaussian[axis] - eye[axis]));
             if color.iter().all(|value| value.is_finite()) {
                 self.entries.extend_from_slice(gaussian);
                 self.entries.extend_from_slice(&color);
@@ -103,6 +126,17 @@ impl DrawList {
             std::mem::swap(&mut self.keys, &mut self.other);
         }
     }
+}
+
+/// The part that has a Gaussian, and its number there.
+fn find<'a>(parts: &'a [Drawn<'a>], mut index: usize) -> Option<(&'a Drawn<'a>, usize)> {
+    for part in parts {
+        if index < part.gaussians.len() {
+            return Some((part, index));
+        }
+        index -= part.gaussians.len();
+    }
+    None
 }
 
 /// The color of a Gaussian at an offset from the camera: `max(0, 0.5 + Σ basis · coefficient)`.
@@ -155,9 +189,13 @@ mod tests {
         (packed, GaussianArrays { means: vec![[0.0; 3]; count], sh_dc, ..GaussianArrays::default() })
     }
 
+    fn drawn((packed, gaussians): &(Vec<f32>, GaussianArrays)) -> Drawn<'_> {
+        Drawn { packed, gaussians, hidden: &[], indices: &[] }
+    }
+
     fn order(list: &mut DrawList, scene: &(Vec<f32>, GaussianArrays), z: f32) -> Vec<usize> {
         let viewpoint = Viewpoint { row: [0.0, 0.0, z, 0.0], eye: [0.0; 3], spread: f32::INFINITY };
-        let entries = list.make(&scene.0, &scene.1, &viewpoint);
+        let entries = list.make(&[drawn(scene)], &viewpoint);
         assert!(entries.len().is_multiple_of(ENTRY * ROW));
         let drawn = entries.chunks_exact(ENTRY).filter(|entry| entry[3] > 0.0);
         drawn.map(|entry| (entry[FLOATS] - 0.5).round() as usize).collect()
@@ -171,6 +209,23 @@ mod tests {
         assert_eq!(order(&mut list, &scene, 1.0), [5, 4, 0, 2, 6]);
         // The same memory is used again, for the view from the other side.
         assert_eq!(order(&mut list, &scene, -1.0), [3]);
+    }
+
+    #[test]
+    fn parts_are_sorted_together_and_hidden_ones_left_out() {
+        let (first, second) = (along_z(&[5.0, 3.0, 1.0]), along_z(&[4.0, 2.0]));
+        let viewpoint = Viewpoint { row: [0.0, 0.0, 1.0, 0.0], eye: [0.0; 3], spread: f32::INFINITY };
+        let depths = |parts: &[Drawn<'_>]| {
+            let mut list = DrawList::default();
+            let drawn = list.make(parts, &viewpoint).chunks_exact(ENTRY).filter(|entry| entry[3] > 0.0);
+            drawn.map(|entry| entry[2]).collect::<Vec<_>>()
+        };
+        let [base, segment] = [&first, &second].map(drawn);
+        assert_eq!(depths(&[base, segment]), [5.0, 4.0, 3.0, 2.0, 1.0]);
+        let hidden = [false, true];
+        assert_eq!(depths(&[Drawn { hidden: &hidden, ..base }, segment]), [5.0, 4.0, 2.0, 1.0]);
+        // A level of detail has some of the Gaussians: here the stream's numbers 1, 4 and 0.
+        assert_eq!(depths(&[Drawn { hidden: &hidden, indices: &[1, 4, 0], ..base }, segment]), [4.0, 3.0, 2.0, 1.0]);
     }
 
     #[test]

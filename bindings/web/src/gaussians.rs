@@ -88,6 +88,21 @@ pub(crate) fn pack(
     }
 }
 
+/// All attributes, activated, one behind the other: centers, standard deviations, unit quaternions, opacities, harmonics.
+pub(crate) fn activated(gaussians: &GaussianArrays) -> Vec<f32> {
+    let rest = gaussians.sh_rest.len() / gaussians.len().max(1);
+    let mut attributes = Vec::with_capacity(gaussians.len() * (14 + rest));
+    attributes.extend(gaussians.means.iter().flatten());
+    attributes.extend(gaussians.log_scales.iter().flat_map(|&log_scales| scales(log_scales)));
+    attributes.extend(gaussians.quats.iter().flat_map(|&quaternion| rotation(quaternion).unwrap_or_default()));
+    attributes.extend(gaussians.opacity_logits.iter().map(|&logit| opacity(logit)));
+    for gaussian in 0..gaussians.len() {
+        attributes.extend_from_slice(&gaussians.sh_dc[gaussian]);
+        attributes.extend_from_slice(&gaussians.sh_rest[rest * gaussian..][..rest]);
+    }
+    attributes
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

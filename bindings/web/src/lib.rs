@@ -11,6 +11,7 @@
 //! | put a player into a page that a program writes | [`page`] |
 //! | decode and sort in Rust, as the player does | [`OpenScene`], [`Viewpoint`] |
 //! | show a file while it comes | [`Arrival`] |
+//! | show a take, segment by segment | [`OpenTake`] |
 //! | compare decoders by one number | [`digest()`] |
 //! | call the decoder from JavaScript of your own | [`abi`] |
 //!
@@ -49,13 +50,15 @@
 //! |---|---|
 //! | `arrival.rs` | a file that is shown while it comes |
 //! | `scene.rs` | a decoded scene, computed at one time after the other |
+//! | `take/` | a take, of which the base and some segments are decoded |
+//! | `part.rs` | Gaussians that move together: those of a scene, of a base or of a segment |
 //! | `levels.rs` | levels of detail: fewer, larger Gaussians that stand for those of a scene |
 //! | `gaussians.rs` | activations, and the values for the vertex shader |
 //! | `draw_list.rs` | the list for drawing, back to front, with colors |
 //! | `limits.rs` | the files that the player takes |
 //! | `description.rs` | the contents of a file for the player's panel, as JSON |
 //! | `digest.rs` | one number for all bits of a decoded scene |
-//! | `abi.rs` | the functions that JavaScript calls |
+//! | `abi/` | the functions that JavaScript calls |
 //! | `page.rs` | pages around the player, for the program; not in WebAssembly |
 pub mod abi;
 mod arrival;
@@ -67,10 +70,13 @@ mod levels;
 mod limits;
 #[cfg(not(target_os = "unknown"))]
 pub mod page;
+mod part;
 mod scene;
+mod take;
 
 pub use arrival::Arrival;
 pub use digest::digest;
 pub use draw_list::{ENTRY, ROW, Viewpoint};
-pub use limits::{MOST_BYTES, limits};
+pub use limits::{MOST_BYTES, limits, take_limits};
 pub use scene::OpenScene;
+pub use take::OpenTake;

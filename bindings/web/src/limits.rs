@@ -9,3 +9,9 @@ pub const MOST_BYTES: u64 = 1 << 29;
 pub fn limits() -> Limits {
     Limits { file_bytes: MOST_BYTES, ..Limits::default() }
 }
+
+/// The limits of a take's index and of each stream in it. The file may be longer. The worker holds a base and some segments, so
+/// each has a part of what a file may have that is alone.
+pub fn take_limits() -> Limits {
+    Limits { file_bytes: MOST_BYTES / 4, ..Limits::default() }
+}

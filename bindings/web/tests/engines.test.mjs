@@ -7,6 +7,7 @@ import { existsSync, mkdirSync, mkdtempSync, readFileSync, readdirSync, rmSync, 
 import { tmpdir } from "node:os";
 import { after, before, describe, test } from "node:test";
 import { bundle, dist, launch, open, orbitCamera, psnr, readPng, root, sceneBytes, serve } from "./harness.mjs";
+import { makeTake, removeTakes } from "./take_harness.mjs";
 
 const examples = `${root}/bindings/web/examples`;
 const installed = existsSync(`${examples}/node_modules`);
@@ -35,6 +36,7 @@ describe("in other engines", { skip: !installed && "npm ci in bindings/web/examp
     }
     files.player = `<!doctype html><link rel=icon href="data:,"><canvas width=${SIZE} height=${SIZE}></canvas>`;
     files["scene.l4gs"] = sceneBytes();
+    files["take.l4gs"] = makeTake(4);
     server = await serve(files);
     browser = await launch();
     if (pictures) mkdirSync(pictures, { recursive: true });
@@ -61,11 +63,12 @@ describe("in other engines", { skip: !installed && "npm ci in bindings/web/examp
   after(async () => {
     await browser?.close();
     server?.close();
+    removeTakes();
     rmSync(folder, { recursive: true, force: true });
   });
 
   const examplePage = async (engine) => {
-    const page = await open(browser, `${server.url}/${engine}/`, { viewport: { width: SIZE, height: SIZE } });
+    const page = await open(browser, `${server.url}/${engine.includes("?") ? engine : `${engine}/`}`, { viewport: { width: SIZE, height: SIZE } });
     await page.waitForFunction(() => globalThis.example);
     return page;
   };
@@ -100,6 +103,21 @@ describe("in other engines", { skip: !installed && "npm ci in bindings/web/examp
       await page.context().close();
     });
   }
+
+  test("a take is drawn in all of them, with another number of Gaussians in each segment", async () => {
+    for (const engine of Object.keys(LEAST_PSNR)) {
+      const page = await examplePage(`${engine}/?scene=/take.l4gs`);
+      const colors = [];
+      for (const seconds of [0.5, 2.5, 4.5, 1.5]) {
+        const { pixels } = await settled(page, seconds);
+        colors.push(Array.from(pixels.subarray(4 * (SIZE * 200 + 200), 4 * (SIZE * 200 + 200) + 3)).map((value) => Number(value > 128)).join(""));
+      }
+      // Red, blue, none, green.
+      assert.deepEqual(colors, ["100", "001", "111", "010"], engine);
+      assert.deepEqual(page.problems, []);
+      await page.context().close();
+    }
+  });
 
   test("the page about the library has a running scene", async () => {
     const page = await open(browser, `${server.url}/`);

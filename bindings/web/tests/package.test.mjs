@@ -7,7 +7,7 @@ import { tmpdir } from "node:os";
 import { after, before, describe, test } from "node:test";
 import { root } from "./harness.mjs";
 
-const source = `${root}/light4gs-web`;
+const source = `${root}/bindings/web`;
 const compiler = `${source}/node_modules/.bin/tsc`;
 const engines = `${source}/examples/node_modules`;
 const manifest = JSON.parse(readFileSync(`${source}/package.json`, "utf8"));
@@ -99,7 +99,7 @@ describe("the package", () => {
 
   test("is imported by node, where there is no DOM", () => {
     const names = run("node", "--input-type=module", "--eval", 'console.log(Object.keys(await import("light4gs-player")).sort().join())');
-    assert.equal(names.trim(), "Camera,Follower,GraphicsError,L4gsPlayer,Player,Scene,SceneError,SplatRenderer,baseColors,dismiss,load,prepare");
+    assert.equal(names.trim(), "Camera,Follower,GraphicsError,L4gsPlayer,Player,Scene,SceneError,SplatRenderer,Take,baseColors,dismiss,load,prepare");
   });
 
   for (const resolution of ["bundler", "nodenext"]) {

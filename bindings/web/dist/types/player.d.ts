@@ -41,7 +41,7 @@ export type PlayerOptions = {
     pixelRatio?: number;
 };
 /**
- * Plays a {@link Scene} on a canvas. Events: `timechange`, `statechange` (playing, loop, speed), `camerachange`, `error`.
+ * Plays a scene or a take on a canvas. Events: `timechange`, `statechange` (playing, loop, speed, waiting), `camerachange`, `error`.
  */
 export declare class Player extends EventTarget {
     #private;
@@ -51,6 +51,8 @@ export declare class Player extends EventTarget {
     pixelRatio: number | undefined;
     loop: boolean;
     speed: number;
+    /** Whether time stands still until more of a take has come. */
+    waiting: boolean;
     /** Whether the camera goes along the training path while time runs. */
     following: boolean;
     /** Red, green, blue in [0, 1]. @type {number[]} */

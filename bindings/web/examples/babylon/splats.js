@@ -8,17 +8,21 @@ const SPLAT = 32;
 
 export async function createSplats(scene, world, shDegree = scene.info.shDegree) {
   const object = new GaussianSplattingMesh("light4gs", null, world);
-  const data = new ArrayBuffer(SPLAT * scene.count);
-  const floats = new Float32Array(data);
-  // Rounds, and clamps to the range of a byte.
-  const bytes = new Uint8ClampedArray(data);
-  const colors = new Float32Array(4 * scene.count);
-  const all = 3 * (scene.info.shDegree + 1) ** 2;
   // The coefficients that depend on the view, as bytes of [-1, 1], 16 of a splat in each texture.
   const rest = 3 * (shDegree + 1) ** 2 - 3;
-  const textures = Array.from({ length: Math.ceil(rest / 16) }, () => new Uint8ClampedArray(16 * scene.count));
+  const memoryFor = (count) => {
+    const data = new ArrayBuffer(SPLAT * count);
+    const textures = Array.from({ length: Math.ceil(rest / 16) }, () => new Uint8ClampedArray(16 * count));
+    // An array of clamped bytes rounds.
+    return { data, floats: new Float32Array(data), bytes: new Uint8ClampedArray(data), colors: new Float32Array(4 * count), textures, count };
+  };
+  let memory = memoryFor(0);
   const follower = new Follower((time) => scene.gaussiansAt(time), (gaussians) => {
     const { count, means, scales, quaternions, sh } = gaussians;
+    // In a take each segment has another number, and may have another degree.
+    if (count !== memory.count) memory = memoryFor(count);
+    const { data, floats, bytes, colors, textures } = memory;
+    const all = 3 * (gaussians.shDegree + 1) ** 2;
     baseColors(gaussians, colors);
     for (let i = 0; i < count; i++) {
       for (let axis = 0; axis < 3; axis++) {
@@ -29,7 +33,7 @@ export async function createSplats(scene, world, shDegree = scene.info.shDegree)
         bytes[SPLAT * i + 24 + k] = 255 * colors[4 * i + k];
         bytes[SPLAT * i + 28 + k] = 127.5 * (1 + quaternions[4 * i + k]);
       }
-      for (let k = 0; k < rest; k++) textures[k >> 4][16 * i + (k & 15)] = 127.5 * (1 + sh[all * i + 3 + k]);
+      for (let k = 0; k < rest; k++) textures[k >> 4][16 * i + (k & 15)] = 127.5 * (1 + (3 + k < all ? sh[all * i + 3 + k] : 0));
     }
     object.updateData(data, rest > 0 ? textures : undefined, { flipY: false }, undefined, shDegree);
   });

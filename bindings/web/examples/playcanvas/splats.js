@@ -14,12 +14,22 @@ const readWGSL = readGLSL.replace(/(vec\d) (\w+)\(\)/g, "fn $2() -> $1f");
 
 export async function createSplats(scene, app) {
   const streams = STREAMS.map((name) => ({ name: `l4gs${name[0].toUpperCase()}${name.slice(1)}`, format: PIXELFORMAT_RGBA32F }));
-  const container = new GSplatContainer(app.graphicsDevice, scene.count, new GSplatFormat(app.graphicsDevice, streams, { readGLSL, readWGSL }));
   const [least, most] = scene.info.bounds.map((corner) => new Vec3(...corner));
-  container.aabb = new BoundingBox(new Vec3().add2(least, most).mulScalar(0.5), new Vec3().sub2(most, least).mulScalar(0.5));
-  const textures = streams.map(({ name }) => container.getTexture(name));
+  const containerFor = (count) => {
+    const made = new GSplatContainer(app.graphicsDevice, count, new GSplatFormat(app.graphicsDevice, streams, { readGLSL, readWGSL }));
+    made.aabb = new BoundingBox(new Vec3().add2(least, most).mulScalar(0.5), new Vec3().sub2(most, least).mulScalar(0.5));
+    return made;
+  };
+  let container = containerFor(scene.count);
   const follower = new Follower((time) => scene.gaussiansAt(time), (gaussians) => {
     const { count, means, scales, quaternions } = gaussians;
+    // A segment of a take may have more Gaussians than the one before.
+    if (count > container.maxSplats) {
+      const before = container;
+      container = object.gsplat.resource = containerFor(count);
+      before.destroy();
+    }
+    const textures = streams.map(({ name }) => container.getTexture(name));
     const [center, scale, rotation, color] = textures.map((texture) => texture.lock());
     for (let i = 0; i < count; i++) {
       for (let axis = 0; axis < 3; axis++) {
@@ -28,11 +38,11 @@ export async function createSplats(scene, app) {
       }
     }
     rotation.set(quaternions);
-    baseColors(gaussians, color);
+    baseColors(gaussians, color.subarray(0, 4 * count));
     for (const texture of textures) texture.unlock();
     // For the order, which a worker of PlayCanvas makes.
     container.centers.set(means);
-    container.update();
+    container.update(count);
     // PlayCanvas draws from a copy of all splats. WORKBUFFER_UPDATE_ONCE would be lost where a new order comes in the same frame.
     object.gsplat.workBufferUpdate = WORKBUFFER_UPDATE_ALWAYS;
   });

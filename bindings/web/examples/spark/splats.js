@@ -7,11 +7,13 @@ export async function createSplats(scene) {
   let object = null;
   const packed = new PackedSplats({ maxSplats: scene.count });
   await packed.initialized;
-  packed.ensureSplats(scene.count);
-  packed.numSplats = scene.count;
-  const colors = new Float32Array(4 * scene.count);
+  let colors = new Float32Array();
   const follower = new Follower((time) => scene.gaussiansAt(time), (gaussians) => {
     const { count, means: m, scales: s, quaternions: q } = gaussians;
+    // In a take each segment has another number.
+    packed.ensureSplats(count);
+    packed.numSplats = count;
+    if (colors.length < 4 * count) colors = new Float32Array(4 * count);
     baseColors(gaussians, colors);
     for (let i = 0; i < count; i++) {
       const [a, b] = [3 * i, 4 * i];

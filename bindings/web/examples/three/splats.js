@@ -67,12 +67,16 @@ void main() {
 }`;
 
 export async function createSplats(scene, camera) {
-  const rows = Math.ceil(scene.count / ROW);
-  const list = new THREE.DataTexture(new Float32Array(16 * ROW * rows), 4 * ROW, rows, THREE.RGBAFormat, THREE.FloatType);
   const geometry = new THREE.BufferGeometry();
-  const indices = new Uint32Array(6 * ROW * rows);
-  for (let i = 0; i < ROW * rows; i++) indices.set([4 * i, 4 * i + 1, 4 * i + 2, 4 * i + 2, 4 * i + 1, 4 * i + 3], 6 * i);
-  geometry.setIndex(new THREE.BufferAttribute(indices, 1));
+  /** A texture for so many rows, and two triangles for each Gaussian. */
+  const textureOf = (rows) => {
+    const indices = new Uint32Array(6 * ROW * rows);
+    for (let i = 0; i < ROW * rows; i++) indices.set([4 * i, 4 * i + 1, 4 * i + 2, 4 * i + 2, 4 * i + 1, 4 * i + 3], 6 * i);
+    geometry.dispose();
+    geometry.setIndex(new THREE.BufferAttribute(indices, 1));
+    return new THREE.DataTexture(new Float32Array(16 * ROW * rows), 4 * ROW, rows, THREE.RGBAFormat, THREE.FloatType);
+  };
+  let list = textureOf(Math.max(Math.ceil(scene.count / ROW), 1));
   geometry.boundingBox = new THREE.Box3(...scene.info.bounds.map((corner) => new THREE.Vector3(...corner)));
   geometry.boundingSphere = geometry.boundingBox.getBoundingSphere(new THREE.Sphere());
   const uniforms = { list: { value: list }, viewport: { value: new THREE.Vector2() }, linear: { value: false } };
@@ -97,6 +101,11 @@ export async function createSplats(scene, camera) {
   const follower = new Follower(
     ({ time, row, eye }) => scene.frame(time, { row, eye }, memory),
     (frame) => {
+      // A segment of a take may have more Gaussians than the one before.
+      if (frame.list.length > list.image.data.length) {
+        list.dispose();
+        list = uniforms.list.value = textureOf(frame.list.length / 16 / ROW);
+      }
       list.image.data.set(frame.list);
       list.needsUpdate = true;
       geometry.setDrawRange(0, (6 / 16) * frame.list.length);

@@ -2,14 +2,17 @@
 
 import { readCameras } from "../views/camera.js";
 import { fillCameras } from "./camera_list.js";
-import { SceneError } from "../errors.js";
 import { Layers } from "./layers.js";
 import { explain } from "./messages.js";
 import { icon, LAYOUT } from "./layout.js";
 import { fillPanel } from "./panel.js";
 import { Player } from "../player.js";
-import { Scene, dismiss, load, prepare } from "../scene/scene.js";
-import { MOST_TEXT, bytesOf, checkLength, download, pieces } from "./sources.js";
+import { RemoteFile } from "../bytes/remote_file.js";
+import { MOST_TEXT, bytesOf, download } from "../bytes/sources.js";
+import { dismiss, load, prepare } from "../scene/load.js";
+import { Scene } from "../scene/scene.js";
+import { Take } from "../take/take.js";
+import { shade } from "./time_line.js";
 import { watch } from "./watch.js";
 
 /** @typedef {import("../views/camera.js").DatasetCamera} DatasetCamera */
@@ -52,6 +55,9 @@ export class L4gsPlayer extends (globalThis.HTMLElement ?? class {}) {
   #abort = new AbortController();
   #connected = false;
   #panelTimer = 0;
+  /** What the line in the corner says, and besides it about a part that cannot be shown. */
+  #status = "";
+  #problem = "";
 
   constructor() {
     super();
@@ -118,24 +124,28 @@ export class L4gsPlayer extends (globalThis.HTMLElement ?? class {}) {
   async load(address, cameras, { keep = false } = {}) {
     const loading = ++this.#loading;
     const { signal } = this.#abort;
+    const shown = this.player?.scene;
     /** The scene, as soon as something of it can be seen. @type {Scene | null} */
     let scene = null;
     let share = 0;
     const report = (/** @type {number} */ now) => {
       share = now;
-      if (scene ? scene !== this.player?.scene : loading !== this.#loading) return;
+      if (scene ? scene !== this.player?.scene || scene instanceof Take : loading !== this.#loading) return;
       if (scene) this.#say(Number.isNaN(share) ? "Loading …" : `Loading ${Math.round(100 * share)} %`);
       else this.layers.progress("Loading", share);
     };
     try {
       const list = cameras ? download(cameras, signal, MOST_TEXT).then((bytes) => readCameras(new TextDecoder().decode(bytes), cameras)) : Promise.resolve([]);
+      // A take that has grown is the same one.
+      if (keep && shown instanceof Take && shown.address === address && (await shown.refresh())) return true;
       if (keep) {
-        const [bytes, known] = await Promise.all([download(address, signal), list]);
-        if (loading === this.#loading) await this.open(bytes, { cameras: known, keep });
+        const source = shown instanceof Take ? load(new RemoteFile(address, { signal })) : download(address, signal);
+        const [loaded, known] = await Promise.all([source, list]);
+        if (loading === this.#loading) await this.open(loaded, { cameras: known, keep });
         return true;
       }
       report(0);
-      const coming = load(pieces(address, signal, { report }));
+      const coming = load(new RemoteFile(address, { signal, report }));
       // Without its cameras the scene is not shown.
       list.catch(() => coming.then((unwanted) => unwanted.close(), () => {}));
       const [loaded, known] = await Promise.all([coming, list]);
@@ -172,7 +182,7 @@ export class L4gsPlayer extends (globalThis.HTMLElement ?? class {}) {
 
   /**
    * Shows a scene: a file, or one that was loaded.
-   * @param {import("../scene/scene.js").Source | Scene} source
+   * @param {import("../scene/load.js").Source | Scene} source
    * @param {{ cameras?: DatasetCamera[], keep?: boolean }} [options]
    */
   async open(source, { cameras = [], keep = false } = {}) {
@@ -185,7 +195,10 @@ export class L4gsPlayer extends (globalThis.HTMLElement ?? class {}) {
       if (loading !== this.#loading) return scene.close();
       const still = matchMedia("(prefers-reduced-motion: reduce)").matches;
       const playing = before ? before.playing : this.hasAttribute("autoplay") && !still && scene.info.moves;
-      const { time, speed = 1, background, camera, home, following = false } = before ?? {};
+      const { speed = 1, background, camera, home, following = false } = before ?? {};
+      // Of a take the second stays, of a scene the share of its length.
+      const grown = before && scene instanceof Take ? before.scene.duration / scene.duration : 1;
+      const time = before ? before.time * grown : undefined;
       const flying = before?.controls?.flying ?? false;
       const chosen = before ? this.find("camera").value : "free";
       this.#end();
@@ -229,6 +242,7 @@ export class L4gsPlayer extends (globalThis.HTMLElement ?? class {}) {
     this.player?.dispose();
     this.player?.scene.close();
     this.player = null;
+    this.#problem = "";
   }
 
   #begin() {
@@ -237,7 +251,7 @@ export class L4gsPlayer extends (globalThis.HTMLElement ?? class {}) {
     if (player.controls) player.controls.wheelAlways = this.hasAttribute("page");
     this.layers.show("");
     this.find("bar").hidden = false;
-    for (const id of ["play", "time", "clock", "speed", "loop"]) this.find(id).hidden = !info.moves;
+    for (const id of ["play", "line", "clock", "speed", "loop"]) this.find(id).hidden = !info.moves;
     this.find("background").value = toHex(player.background);
     this.find("speed").value = String(player.speed);
     this.#nameCanvas();
@@ -247,16 +261,31 @@ export class L4gsPlayer extends (globalThis.HTMLElement ?? class {}) {
     player.addEventListener("statechange", this.#showState);
     player.addEventListener("camerachange", this.#showCamera);
     player.addEventListener("error", (event) => this.#fail(/** @type {CustomEvent} */ (event).detail));
+    for (const event of ["progress", "change"]) player.scene.addEventListener(event, this.#showParts);
+    // A step of a key is a frame, where that is less.
+    this.find("time").step = String(Math.min(0.001, 1 / info.frameCount));
+    this.#showParts();
     this.#showTime();
     this.#showState();
     this.#togglePanel(!this.find("panel").hidden);
     this.dispatchEvent(new Event("load"));
   }
 
+  /** The parts of a take that have come. */
+  #showParts = () => {
+    if (!this.player) return;
+    const { scene } = this.player;
+    const { loaded, problems } = scene instanceof Take ? scene : { loaded: [], problems: [] };
+    shade(this.find("parts"), loaded, scene.duration);
+    this.#problem = problems.length > 0 ? `Cannot be shown: ${problems[problems.length - 1].message}` : "";
+    this.#say(this.#status);
+    this.#showTime();
+  };
+
   /** The description of the scene for screen readers. */
   #nameCanvas() {
-    const { info } = /** @type {Player} */ (this.player).scene;
-    this.canvas.setAttribute("aria-label", `${info.name || "Scene"}: ${info.count} Gaussians${info.moves ? `, ${info.frameCount} frames` : ""}`);
+    const { info, count } = /** @type {Player} */ (this.player).scene;
+    this.canvas.setAttribute("aria-label", `${info.name || "Scene"}: ${count} Gaussians${info.moves ? `, ${info.frameCount} frames` : ""}`);
   }
 
   #showTime = () => {
@@ -280,6 +309,7 @@ export class L4gsPlayer extends (globalThis.HTMLElement ?? class {}) {
     play.title = `${label} (space)`;
     this.find("loop").setAttribute("aria-pressed", String(player.loop));
     this.find("fly").setAttribute("aria-pressed", String(player.controls?.flying ?? false));
+    this.#say(this.#status);
     this.dispatchEvent(new Event("statechange"));
   };
 
@@ -297,8 +327,10 @@ export class L4gsPlayer extends (globalThis.HTMLElement ?? class {}) {
 
   /** A line in a corner of the image; none where it is empty. */
   #say = (/** @type {string} */ status) => {
-    this.find("status").textContent = status;
-    this.find("status").hidden = !status;
+    this.#status = status;
+    const text = [status, this.player?.waiting && "Loading …", this.#problem].filter(Boolean).join(" · ");
+    this.find("status").textContent = text;
+    this.find("status").hidden = !text;
   };
 
   /** @param {any} error */
@@ -425,20 +457,9 @@ export class L4gsPlayer extends (globalThis.HTMLElement ?? class {}) {
   }
 
   /** @param {File | undefined} file */
-  async #openFile(file) {
-    if (!file) return;
+  #openFile(file) {
     this.find("file").value = "";
-    // The file that was chosen last is the one that is shown, whichever is read first.
-    const loading = ++this.#loading;
-    this.layers.progress("Reading");
-    try {
-      checkLength(file.name, file.size);
-      const bytes = await file.arrayBuffer();
-      if (loading === this.#loading) await this.open(bytes);
-    } catch (error) {
-      if (loading !== this.#loading) return;
-      this.#fail(error instanceof SceneError ? error : new SceneError("network", `${file.name}: ${error instanceof Error ? error.message : error}`));
-    }
+    if (file) this.open(file);
   }
 
   #watch() {

@@ -37,7 +37,7 @@ export const LAYOUT = `<style>${style}</style>
 </div>
 <div id="bar" role="group" aria-label="Playback" hidden>
   ${button("play", "Play", "space")}
-  <input id="time" type="range" min="0" max="1" step="0.001" value="0" aria-label="Time">
+  <span id="line"><input id="time" type="range" min="0" max="1" step="0.001" value="0" aria-label="Time"><i id="parts"></i></span>
   <output id="clock" for="time"></output>
   <select id="speed" aria-label="Speed" title="Speed">
     <option value="0.1">0.1×</option><option value="0.25">0.25×</option><option value="0.5">0.5×</option>

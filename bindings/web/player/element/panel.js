@@ -42,7 +42,7 @@ export function fillPanel(panel, player) {
   table.append(
     body([
       ["File", size(info.bytes)],
-      ["Gaussians", number.format(info.count)],
+      ["Gaussians", number.format(player.scene.count)],
       ["Harmonics", `degree ${info.shDegree}`],
       ["Frames", info.fps > 0 ? `${info.frameCount} at ${info.fps} a second` : String(info.frameCount)],
       ["Image", `${player.view.width} × ${player.view.height}`],

@@ -1,6 +1,6 @@
 // Looks at a small text again and again: how a page follows a scene that is still being trained.
 
-import { MOST_TEXT, download } from "./sources.js";
+import { MOST_TEXT, download } from "../bytes/sources.js";
 
 /** Milliseconds between two looks. */
 const INTERVAL = 1500;

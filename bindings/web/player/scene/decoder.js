@@ -6,7 +6,7 @@ import { SceneError } from "../errors.js";
 const SLICE = 8192;
 
 /**
- * @typedef {object} Exports  what bindings/web/src/abi.rs exports
+ * @typedef {object} Exports  what bindings/web/src/abi exports
  * @property {WebAssembly.Memory} memory
  * @property {(bytes: number) => number} reserve_input
  * @property {() => number} open
@@ -16,23 +16,32 @@ const SLICE = 8192;
  * @property {() => number} text
  * @property {() => number} text_length
  * @property {() => bigint} digest
- * @property {(level: number) => number} show_level
+ * @property {() => void} begin_index
+ * @property {() => number} push_index
+ * @property {(bytes: number) => number} finish_index
+ * @property {() => number} open_base
+ * @property {(begin: number) => number} unpack_segment
+ * @property {(begin: number) => number} open_segment
+ * @property {(begin: number) => void} close_segment
+ * @property {() => number} output
+ * @property {() => number} output_length
+ * @property {() => void} forget_output
+ * @property {(level: number, time: number) => number} show
  * @property {() => number} count
  * @property {(time: number, first: number, last: number) => void} evaluate
  * @property {(row_x: number, row_y: number, row_z: number, row_w: number, eye_x: number, eye_y: number, eye_z: number, spread: number) => number} draw_list
  * @property {() => number} list_length
  * @property {(time: number) => number} attributes_at
  * @property {() => number} numbers_length
+ * @property {() => number} numbers_degree
  * @property {() => void} forget_numbers
  */
 
-/** One decoded scene in one instance of the module. */
+/** One decoded scene, or one take, in one instance of the module. */
 export class Decoder {
   /** @param {WebAssembly.Module} module */
   constructor(module) {
     this.wasm = /** @type {Exports} */ (/** @type {unknown} */ (new WebAssembly.Instance(module, {}).exports));
-    /** @type {import("./scene.js").SceneInfo | null} */
-    this.info = null;
     /** The times to which the Gaussians of the scene and those of its level were moved: NaN before the first evaluation. */
     this.times = [NaN, NaN];
     /** Which of the two is shown. */
@@ -46,7 +55,7 @@ export class Decoder {
    */
   open(bytes) {
     const info = this.#answer(() => {
-      this.#give(bytes);
+      this.give(bytes);
       return this.wasm.open();
     });
     return /** @type {import("./scene.js").SceneInfo} */ (info);
@@ -63,7 +72,7 @@ export class Decoder {
    */
   push(bytes) {
     return this.#answer(() => {
-      this.#give(bytes);
+      this.give(bytes);
       return this.wasm.push();
     });
   }
@@ -73,10 +82,39 @@ export class Decoder {
     this.#answer(() => this.wasm.finish());
   }
 
-  /** @param {Uint8Array} bytes */
-  #give(bytes) {
+  /** Nothing is evaluated yet. */
+  forgetTimes() {
+    this.times = [NaN, NaN];
+    this.shown = 0;
+  }
+
+  /** @param {Uint8Array} bytes  for the function that is called next */
+  give(bytes) {
     const at = this.wasm.reserve_input(bytes.length);
     new Uint8Array(this.wasm.memory.buffer, at, bytes.length).set(bytes);
+  }
+
+  /**
+   * What a function of the module says, where it says something.
+   * @param {() => number} call  0 for an error, 1 for a text
+   * @returns {any}
+   * @throws {SceneError}
+   */
+  call(call) {
+    const { wasm } = this;
+    let answer;
+    try {
+      answer = call();
+    } catch (error) {
+      // The module stops itself when memory runs out: there is nothing to unwind to.
+      throw new SceneError("memory", `the decoder stopped (${error instanceof Error ? error.message : error})`);
+    }
+    if (answer > 1) return null;
+    const text = new Uint8Array(wasm.memory.buffer, wasm.text(), wasm.text_length());
+    // Notes in a file may be any text.
+    const said = JSON.parse(new TextDecoder().decode(text) || "null");
+    if (!answer) throw new SceneError(said.error, said.message);
+    return said;
   }
 
   /**
@@ -85,23 +123,9 @@ export class Decoder {
    * @returns {import("./scene.js").SceneInfo | null}
    */
   #answer(ask) {
-    const { wasm } = this;
-    let answer;
-    try {
-      answer = ask();
-    } catch (error) {
-      // The module stops itself when memory runs out: there is nothing to unwind to.
-      throw new SceneError("memory", `the decoder stopped (${error instanceof Error ? error.message : error})`);
-    }
-    if (answer > 1) return null;
-    const text = new Uint8Array(wasm.memory.buffer, wasm.text(), wasm.text_length());
-    // Notes in a file may be any text.
-    const description = JSON.parse(new TextDecoder().decode(text));
-    if (!answer) throw new SceneError(description.error, description.message);
-    this.info = description;
-    this.times = [NaN, NaN];
-    this.shown = 0;
-    return description;
+    const info = this.call(ask);
+    if (info) this.forgetTimes();
+    return info;
   }
 
   /** Number of Gaussians of the level that is shown. */
@@ -117,9 +141,10 @@ export class Decoder {
   /**
    * Chooses the level of detail of evaluations and lists: 0 is the scene itself.
    * @param {number} level
+   * @param {number} time  of a take, the segment of this time is chosen too
    */
-  showLevel(level) {
-    if (this.wasm.show_level(level)) this.times[1] = NaN;
+  show(level, time) {
+    if (this.wasm.show(level, time)) this.times[1] = NaN;
     this.shown = Number(level > 0);
   }
 
@@ -137,7 +162,7 @@ export class Decoder {
   }
 
   /**
-   * The list for drawing the last evaluation, see abi.rs.
+   * The list for drawing the last evaluation, see src/abi.
    * @param {import("./scene.js").Viewpoint} viewpoint
    * @param {ArrayBuffer | null} memory  to be used again
    */
@@ -151,14 +176,14 @@ export class Decoder {
   }
 
   /**
-   * All attributes at a time, one behind the other.
+   * All attributes at a time, one behind the other, and the degree of the harmonics.
    * @param {number} time
    */
   attributesAt(time) {
     const at = this.wasm.attributes_at(time);
     const numbers = new Float32Array(this.wasm.memory.buffer, at, this.wasm.numbers_length()).slice();
     this.wasm.forget_numbers();
-    return numbers;
+    return { numbers, shDegree: this.wasm.numbers_degree() };
   }
 
   /**
@@ -166,7 +191,7 @@ export class Decoder {
    * @param {Uint8Array} bytes
    */
   digest(bytes) {
-    this.#give(bytes);
+    this.give(bytes);
     return BigInt.asUintN(64, this.wasm.digest()).toString(16).padStart(16, "0");
   }
 }

@@ -1,11 +1,14 @@
-// The worker: one scene, decoded, moved and sorted off the main thread.
+// The worker: one scene or one take, decoded, moved and sorted off the main thread.
 
 import sampleBase64 from "virtual:sample";
 import { Decoder } from "./decoder.js";
 import { SceneError } from "../errors.js";
+import { TakeDecoder } from "../take/take_decoder.js";
 
 /** @type {Decoder | null} */
 let decoder = null;
+/** The take, where it is one. @type {TakeDecoder | null} */
+let take = null;
 
 // A message to oneself comes after those that are waiting.
 const channel = new MessageChannel();
@@ -37,7 +40,7 @@ const inTurn = (/** @type {() => void | Promise<void>} */ work) => {
 /** @param {any} request */
 async function frame({ id, time, viewpoint, memory, level }) {
   if (!decoder) throw new Error("no scene is open");
-  decoder.showLevel(level);
+  (take ?? decoder).show(level, time);
   const start = performance.now();
   const moved = time !== decoder.time;
   if (moved) await decoder.evaluate(time, pause);
@@ -82,12 +85,42 @@ const answers = {
     send({ id });
   },
 
+  index: ({ id, ranges, length }) =>
+    inTurn(() => {
+      if (!decoder) throw new Error("there is no decoder");
+      take ??= new TakeDecoder(decoder);
+      send({ id, ...take.index(ranges, length) });
+    }),
+
+  base: ({ id, bytes }) =>
+    inTurn(() => {
+      const start = performance.now();
+      const info = take?.base(bytes);
+      send({ id, info, milliseconds: performance.now() - start });
+    }),
+
+  unpack: ({ id, begin, bytes }) =>
+    inTurn(() => {
+      if (!take) throw new Error("no take is open");
+      const start = performance.now();
+      const unpacked = take.unpack(begin, bytes);
+      send({ id, unpacked, milliseconds: performance.now() - start }, [unpacked.buffer]);
+    }),
+
+  segment: ({ id, begin, unpacked }) => inTurn(() => send({ id, ...take?.segment(begin, unpacked) })),
+
+  forget: ({ id, begin }) =>
+    inTurn(() => {
+      take?.forget(begin);
+      send({ id });
+    }),
+
   frame: (request) => inTurn(() => frame(request)),
 
   attributes({ id, time }) {
     if (!decoder) throw new Error("no scene is open");
-    const numbers = decoder.attributesAt(time);
-    send({ id, numbers }, [numbers.buffer]);
+    const { numbers, shDegree } = decoder.attributesAt(time);
+    send({ id, numbers, shDegree }, [numbers.buffer]);
   },
 
   digest({ id, bytes }) {

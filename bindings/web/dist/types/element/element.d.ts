@@ -40,10 +40,10 @@ export declare class L4gsPlayer extends L4gsPlayer_base {
     }): Promise<boolean>;
     /**
      * Shows a scene: a file, or one that was loaded.
-     * @param {import("../scene/scene.js").Source | Scene} source
+     * @param {import("../scene/load.js").Source | Scene} source
      * @param {{ cameras?: DatasetCamera[], keep?: boolean }} [options]
      */
-    open(source: import("../scene/scene.js").Source | Scene, { cameras, keep }?: {
+    open(source: import("../scene/load.js").Source | Scene, { cameras, keep }?: {
         cameras?: DatasetCamera[];
         keep?: boolean;
     }): Promise<void>;

@@ -1,3 +1,4 @@
+export type Connection = import("./connection.js").Connection;
 export type SceneInfo = {
     /**
      * for people
@@ -132,41 +133,78 @@ export type Frame = {
      */
     sortMs: number;
 };
-export type Source = ArrayBuffer | Uint8Array | ReadableStream<Uint8Array> | AsyncIterable<Uint8Array>;
+/** @typedef {import("./connection.js").Connection} Connection */
 /**
- * A decoded scene. Made by {@link load}; {@link Scene.close} frees what it holds. Where its file is still coming, the event
- * `change` tells of more Gaussians.
+ * @typedef {object} SceneInfo  what a file says of itself
+ * @property {string} name  for people
+ * @property {number} frameCount  frames of the source
+ * @property {number} fps  frames a second of the source, 0 where it is not known
+ * @property {[number[], number[]]} bounds  smallest and largest corner, world units
+ * @property {[number, number, number]} background  red, green, blue in [0, 1]
+ * @property {number} width  of the source's default camera, pixels
+ * @property {number} height  of the source's default camera, pixels
+ * @property {number} fovX  its horizontal field of view, radians
+ * @property {number} version  of the format
+ * @property {number} bytes  of the file
+ * @property {number} count  Gaussians
+ * @property {number} shDegree  of the spherical harmonics, 0 to 3
+ * @property {boolean} moves  whether anything changes with time
+ * @property {number} layers  layers of Gaussians that the file has
+ * @property {number} layersShown  those that have come
+ * @property {number} levels  levels of detail besides the scene itself; each has half of the Gaussians of the one before
+ * @property {[string, number][]} sections  name and bytes of each part of the file
+ * @property {Record<string, string>} extra  free notes
+ */
+/**
+ * @typedef {object} GaussiansAt  activated attributes of N Gaussians
+ * @property {number} count  N
+ * @property {Float32Array} means  `[N, 3]`: centers, world units
+ * @property {Float32Array} scales  `[N, 3]`: standard deviations, world units
+ * @property {Float32Array} quaternions  `[N, 4]`: `(w, x, y, z)` of unit length
+ * @property {Float32Array} opacities  `[N]` in [0, 1]
+ * @property {number} shDegree  d
+ * @property {Float32Array} sh  `[N, (d + 1)², 3]`: a color is `max(0, 0.5 + Σ basis · coefficient)`
+ */
+/**
+ * @typedef {object} Viewpoint  where a scene is seen from
+ * @property {ArrayLike<number>} row  the depth of a point is `row · (x, y, z, 1)`
+ * @property {ArrayLike<number>} eye  the camera's center, world units
+ * @property {number} [spread]  what does not reach into the cone around the view axis is left out: the tangent of its angle to
+ *   the axis; all in front of the camera where not given
+ */
+/**
+ * @typedef {object} Frame  what the renderer draws
+ * @property {Float32Array} list  back to front, 16 numbers a Gaussian: center (3), opacity, covariance xx, xy, xz, yy, yz, zz,
+ *   color as seen from the viewpoint (3), three zeros; filled up to a multiple of 256 Gaussians with zeros
+ * @property {number} evaluateMs  what the motion took; 0 where the list before was for the same time
+ * @property {number} sortMs  what order and colors took
+ */
+/**
+ * What a {@link import("../player.js").Player} plays. Times are in [0, 1] of a scene, and in seconds of a take.
  */
 export declare class Scene extends EventTarget {
-    #private;
+    connection: import("./connection.js").Connection;
     /** @type {SceneInfo} */
     info: SceneInfo;
     /** Time of decoding, milliseconds. */
     decodeMs: number;
     /** Resolves when the whole file is there; fails with a {@link SceneError} where it does not come. @type {Promise<void>} */
     whole: Promise<void>;
-    /** Use {@link load}. */
-    constructor();
-    /** @param {ArrayBuffer} bytes */
-    open(bytes: ArrayBuffer): Promise<void>;
-    /**
-     * Resolves as soon as there is something to see.
-     * @param {AsyncIterable<Uint8Array>} pieces
-     */
-    receive(pieces: AsyncIterable<Uint8Array>): Promise<void>;
+    /** @param {Connection} connection  to the worker that draws */
+    constructor(connection: Connection);
     /** Number of Gaussians. */
     get count(): number;
     /** Length in seconds: the source's where it is known, else at 30 frames a second. */
     get duration(): number;
     /**
-     * The Gaussians at a time in [0, 1], activated, for a renderer of your own.
+     * The Gaussians at a time, activated, for a renderer of your own.
      * @param {number} time
      * @returns {Promise<GaussiansAt>}
      */
     gaussiansAt(time: number): Promise<GaussiansAt>;
     /**
      * The list of Gaussians to draw at a time from a viewpoint.
-     * @param {number} time  in [0, 1]
+     * @param {number} time
      * @param {Viewpoint} viewpoint
      * @param {ArrayBuffer | null} [memory]  to be used again
      * @param {number} [level]  of detail: 0 is the scene itself, at most {@link SceneInfo.levels}
@@ -179,18 +217,28 @@ export declare class Scene extends EventTarget {
      * @returns {Promise<string>}
      */
     digest(bytes: ArrayBuffer): Promise<string>;
+    /**
+     * The time for {@link Scene.frame} at a share of the duration.
+     * @param {number} share  in [0, 1]
+     */
+    momentAt(share: number): number;
+    /**
+     * Says where a player is, for each frame, so that what comes next is loaded.
+     * @param {number} share  of the duration
+     * @param {boolean} loop  whether the beginning follows the end
+     */
+    follow(share: number, loop: boolean): void;
+    /**
+     * Whether the time has to wait for something that is still on its way.
+     * @param {number} share  of the duration
+     */
+    waitsAt(share: number): boolean;
+    /**
+     * Resolves when what is shown at a time is there.
+     * @param {number} share  of the duration
+     * @returns {Promise<void>}
+     */
+    ready(share: number): Promise<void>;
     /** Ends the worker and frees its memory. Open requests fail with a {@link SceneError} `closed`. */
     close(): void;
 }
-/** Starts a decoder, so that it is ready when the bytes of a file arrive. {@link load} does so itself, but only then. */
-export declare function prepare(): void;
-/** Ends the decoder that {@link prepare} started, where no file has come for it. */
-export declare function dismiss(): void;
-/**
- * Decodes a `.l4gs` file. One that comes as a stream is there as soon as something can be seen: {@link Scene.whole} says when
- * all of it is.
- * @param {Source} source
- * @returns {Promise<Scene>}
- * @throws {SceneError} whose `kind` says what is wrong with the file
- */
-export declare function load(source: Source): Promise<Scene>;

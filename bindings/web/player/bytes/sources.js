@@ -3,9 +3,9 @@
 import { SceneError } from "../errors.js";
 
 /** How often a connection that breaks is resumed. */
-const RESUMES = 3;
+export const RESUMES = 3;
 /** Milliseconds before that. */
-const PAUSE = 300;
+export const PAUSE = 300;
 /** Bytes of the longest file that the decoder takes, as in src/limits.rs. */
 export const MOST_BYTES = 2 ** 29;
 /** Bytes of the longest text: the cameras of a scene, or what a page watches. */
@@ -43,12 +43,13 @@ async function* read(reader, report) {
  * has come yet, all of it. (Of a connection that is cut right behind the data, a browser may give none of them.)
  * @param {string} address
  * @param {AbortSignal} signal
- * @param {{ report?: (share: number) => void, most?: number }} [options]  `report` is told how much has come, in [0, 1]; NaN where that is not
- *   known. `most` bytes are accepted
+ * @param {{ report?: (share: number) => void, most?: number, opened?: (file: { length: number, ranges: boolean }) => void }} [options]
+ *   `report` is told how much has come, in [0, 1]; NaN where that is not known. `most` bytes are accepted. `opened` is told how long the
+ *   file is, NaN where that is not known, and whether the server may give ranges of it
  * @returns {AsyncGenerator<Uint8Array<ArrayBuffer>>}
  * @throws {SceneError} `network`, `too-large`
  */
-export async function* pieces(address, signal, { report = () => {}, most = MOST_BYTES } = {}) {
+export async function* pieces(address, signal, { report = () => {}, most = MOST_BYTES, opened = () => {} } = {}) {
   let received = 0;
   let total = NaN;
   /** The file's tag. While it stays the same, so does the file. */
@@ -72,7 +73,11 @@ export async function* pieces(address, signal, { report = () => {}, most = MOST_
         checkLength(address, total, most);
         tag = response.headers.get("etag") ?? "";
         // A weak tag may be that of other bytes, and ranges of compressed bytes are others.
-        resumable = response.headers.get("accept-ranges") === "bytes" && !response.headers.has("content-encoding") && !tag.startsWith("W/");
+        const plain = !response.headers.has("content-encoding");
+        resumable = response.headers.get("accept-ranges") === "bytes" && plain && !tag.startsWith("W/");
+        // Servers elsewhere may not show this header: then it is tried.
+        const ranges = response.headers.get("accept-ranges") ?? (response.type === "cors" ? "bytes" : "");
+        opened({ length: plain ? total : NaN, ranges: plain && ranges === "bytes" });
       }
       const count = (/** @type {number} */ bytes) => {
         received += bytes;

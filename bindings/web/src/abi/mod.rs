@@ -1,33 +1,46 @@
-//! The functions that JavaScript calls. An instance of the module holds one scene; a worker has one instance.
+//! The functions that JavaScript calls. An instance of the module holds one scene or one take; a worker has one instance.
 //!
 //! A returned pointer is valid until the next call. Lengths are counts of bytes, of numbers or of Gaussians, as each
 //! function says. Only WebAssembly exports the functions under their names: elsewhere `open` is the operating system's.
 
+pub mod take;
+
 use std::sync::{Mutex, MutexGuard, PoisonError};
 
 use light4gs_codec::CodecError;
+use light4gs_codec::take::IndexReader;
 
 use crate::Arrival;
 use crate::description::describe_error;
 use crate::draw_list::Viewpoint;
 use crate::scene::OpenScene;
+use crate::take::OpenTake;
 
 #[derive(Default)]
 struct State {
     scene: Option<OpenScene>,
     arrival: Option<Arrival>,
+    /// Where there is a take, it is shown in place of the scene.
+    take: Option<OpenTake>,
+    index: Option<IndexReader>,
     input: Vec<u8>,
+    output: Vec<u8>,
     text: String,
     numbers: Vec<f32>,
+    numbers_degree: u8,
     list_length: usize,
 }
 
 static STATE: Mutex<State> = Mutex::new(State {
     scene: None,
     arrival: None,
+    take: None,
+    index: None,
     input: Vec::new(),
+    output: Vec::new(),
     text: String::new(),
     numbers: Vec::new(),
+    numbers_degree: 0,
     list_length: 0,
 });
 
@@ -79,6 +92,13 @@ pub extern "C" fn finish() -> u32 {
 }
 
 impl State {
+    /// Keeps what is said of an answer, or the error, and returns whether it is an answer.
+    fn say(&mut self, answer: Result<String, CodecError>) -> u32 {
+        let good = u32::from(answer.is_ok());
+        self.text = answer.unwrap_or_else(|error| describe_error(&error));
+        good
+    }
+
     /// Keeps a scene, where there is a new one, or the error.
     fn take(&mut self, answer: Result<Option<OpenScene>, CodecError>) -> u32 {
         match answer {
@@ -115,24 +135,34 @@ pub extern "C" fn digest() -> u64 {
     light4gs_codec::decode(&input).map_or(0, |scene| crate::digest(&scene))
 }
 
-/// Chooses the level of detail for [`evaluate`] and [`draw_list`]: 0 is the scene itself. Returns 1 if nothing of it
-/// is evaluated yet, else 0.
+/// Chooses what [`evaluate`] and [`draw_list`] are about: a level of detail, where 0 has all Gaussians, and of a take the
+/// segment of a time in seconds. Returns 1 if nothing of it is evaluated yet, else 0.
 #[cfg_attr(target_os = "unknown", unsafe(no_mangle))]
-pub extern "C" fn show_level(level: u32) -> u32 {
-    state().scene.as_mut().map_or(0, |scene| u32::from(scene.show_level(level)))
+pub extern "C" fn show(level: u32, time: f64) -> u32 {
+    let state = &mut *state();
+    let new = match (&mut state.take, &mut state.scene) {
+        (Some(take), _) => take.show(time, level),
+        (None, Some(scene)) => scene.show_level(level),
+        (None, None) => false,
+    };
+    u32::from(new)
 }
 
-/// The number of Gaussians of the level of [`show_level`].
+/// The number of Gaussians that [`evaluate`] moves.
 #[cfg_attr(target_os = "unknown", unsafe(no_mangle))]
 pub extern "C" fn count() -> usize {
-    state().scene.as_ref().map_or(0, OpenScene::count)
+    let state = state();
+    state.take.as_ref().map_or_else(|| state.scene.as_ref().map_or(0, OpenScene::count), OpenTake::count)
 }
 
-/// Computes the Gaussians `first` to `last` at a time in [0, 1].
+/// Computes the Gaussians `first` to `last` at a time: in [0, 1] of a scene, in seconds of a take.
 #[cfg_attr(target_os = "unknown", unsafe(no_mangle))]
-pub extern "C" fn evaluate(time: f32, first: usize, last: usize) {
-    if let Some(scene) = &mut state().scene {
-        scene.evaluate(time, first, last);
+pub extern "C" fn evaluate(time: f64, first: usize, last: usize) {
+    let state = &mut *state();
+    match (&mut state.take, &mut state.scene) {
+        (Some(take), _) => take.evaluate(time, first, last),
+        (None, Some(scene)) => scene.evaluate(time as f32, first, last),
+        (None, None) => {}
     }
 }
 
@@ -153,7 +183,11 @@ pub extern "C" fn draw_list(
 ) -> *const f32 {
     let viewpoint = Viewpoint { row: [row_x, row_y, row_z, row_w], eye: [eye_x, eye_y, eye_z], spread };
     let state = &mut *state();
-    let list = state.scene.as_mut().map_or(&[][..], |scene| scene.draw_list(&viewpoint));
+    let list = match (&mut state.take, &mut state.scene) {
+        (Some(take), _) => take.draw_list(&viewpoint),
+        (None, Some(scene)) => scene.draw_list(&viewpoint),
+        (None, None) => &[],
+    };
     state.list_length = list.len();
     list.as_ptr()
 }
@@ -164,12 +198,23 @@ pub extern "C" fn list_length() -> usize {
     state().list_length
 }
 
-/// All attributes at a time. [`numbers_length`] is the number of numbers.
+/// All attributes at a time, as for [`evaluate`]. [`numbers_length`] is the number of numbers, [`numbers_degree`] the degree
+/// of the harmonics.
 #[cfg_attr(target_os = "unknown", unsafe(no_mangle))]
-pub extern "C" fn attributes_at(time: f32) -> *const f32 {
+pub extern "C" fn attributes_at(time: f64) -> *const f32 {
     let state = &mut *state();
-    state.numbers = state.scene.as_ref().map(|scene| scene.attributes_at(time)).unwrap_or_default();
+    (state.numbers, state.numbers_degree) = match (&state.take, &state.scene) {
+        (Some(take), _) => take.attributes_at(time),
+        (None, Some(scene)) => (scene.attributes_at(time as f32), scene.sh_degree()),
+        (None, None) => Default::default(),
+    };
     state.numbers.as_ptr()
+}
+
+/// The degree of the harmonics that [`attributes_at`] returned.
+#[cfg_attr(target_os = "unknown", unsafe(no_mangle))]
+pub extern "C" fn numbers_degree() -> u32 {
+    state().numbers_degree.into()
 }
 
 /// The number of numbers that [`attributes_at`] returned.

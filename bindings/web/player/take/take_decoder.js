@@ -1,0 +1,98 @@
+// What the worker does with a take, besides evaluating and drawing.
+
+/** @typedef {import("../scene/decoder.js").Decoder} Decoder */
+
+export class TakeDecoder {
+  #decoder;
+  /** The level that was evaluated last. */
+  #level = 0;
+
+  /** @param {Decoder} decoder */
+  constructor(decoder) {
+    this.#decoder = decoder;
+  }
+
+  /**
+   * Reads the index. It needs ranges of the file, one after the other.
+   * @param {Uint8Array[]} ranges  those that it has needed so far
+   * @param {number} length  bytes of the file; a very large number where they are not known
+   * @returns {{ needed: [number, number] } | { index: import("./take.js").Index | null }}  null where it is that of another file than before
+   */
+  index(ranges, length) {
+    const { wasm } = this.#decoder;
+    wasm.begin_index();
+    /** @type {{ needed: [number, number] } | null} */
+    let more = null;
+    // No bytes at all ask for the first range.
+    for (const bytes of [new Uint8Array(), ...ranges]) {
+      more = this.#decoder.call(() => {
+        this.#decoder.give(bytes);
+        return wasm.push_index();
+      });
+    }
+    if (more) return more;
+    this.#decoder.forgetTimes();
+    return { index: this.#decoder.call(() => wasm.finish_index(length)) };
+  }
+
+  /**
+   * Decodes the base.
+   * @param {Uint8Array} bytes
+   * @returns {import("../scene/scene.js").SceneInfo}
+   */
+  base(bytes) {
+    this.#decoder.forgetTimes();
+    return this.#decoder.call(() => {
+      this.#decoder.give(bytes);
+      return this.#decoder.wasm.open_base();
+    });
+  }
+
+  /**
+   * Decodes a segment for another worker.
+   * @param {number} begin
+   * @param {Uint8Array} bytes  those of the file
+   */
+  unpack(begin, bytes) {
+    const { wasm } = this.#decoder;
+    this.#decoder.call(() => {
+      this.#decoder.give(bytes);
+      return wasm.unpack_segment(begin);
+    });
+    const unpacked = new Uint8Array(wasm.memory.buffer, wasm.output(), wasm.output_length()).slice();
+    wasm.forget_output();
+    return unpacked;
+  }
+
+  /**
+   * Opens what another worker has decoded.
+   * @param {number} begin
+   * @param {Uint8Array} unpacked
+   * @returns {{ count: number, levels: number }}
+   */
+  segment(begin, unpacked) {
+    this.#decoder.forgetTimes();
+    return this.#decoder.call(() => {
+      this.#decoder.give(unpacked);
+      return this.#decoder.wasm.open_segment(begin);
+    });
+  }
+
+  /** @param {number} begin */
+  forget(begin) {
+    this.#decoder.forgetTimes();
+    this.#decoder.wasm.close_segment(begin);
+  }
+
+  /**
+   * Chooses level of detail and segment. Base and segment need not have the same levels: a small one is shown as it is, at any level.
+   * @param {number} level
+   * @param {number} time
+   */
+  show(level, time) {
+    this.#decoder.show(level, time);
+    this.#decoder.shown = 0;
+    if (level !== this.#level) this.#decoder.forgetTimes();
+    this.#level = level;
+  }
+}

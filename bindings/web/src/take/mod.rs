@@ -1,0 +1,175 @@
+//! A take, of which the base and some segments are decoded.
+//!
+//! A segment is named by its `begin`: no two segments have the same one, and it stays where the take grows.
+
+mod description;
+mod unpacked;
+
+use light4gs_codec::take::{SegmentPlace, TakeIndex, drawn_together};
+use light4gs_codec::{CodecError, Decoded, Limits, OpenStream, SceneData, decode_with_limits};
+
+use self::unpacked::Unpacked;
+use crate::description::{Facts, describe};
+use crate::draw_list::{DrawList, Viewpoint};
+use crate::gaussians::activated;
+use crate::levels::levels;
+use crate::limits::{limits, take_limits};
+use crate::part::Part;
+
+pub(crate) use self::description::{describe_index, describe_range};
+
+/// A take whose index is known.
+#[derive(Debug)]
+pub struct OpenTake {
+    index: TakeIndex,
+    /// None before it has come.
+    base: Option<Part>,
+    segments: Vec<Segment>,
+    /// The segment of `segments` that is drawn.
+    shown: Option<usize>,
+    list: DrawList,
+}
+
+/// A segment that is decoded.
+#[derive(Debug)]
+struct Segment {
+    place: SegmentPlace,
+    part: Part,
+    hidden: Vec<bool>,
+}
+
+impl OpenTake {
+    /// A take of which nothing but the index is there.
+    pub fn new(index: TakeIndex) -> Self {
+        Self { index, base: None, segments: Vec::new(), shown: None, list: DrawList::default() }
+    }
+
+    /// Takes the index of a take that may have grown: all that was there is still there, be it at another place of a file that was
+    /// written anew. Another index is not taken. Returns whether it was.
+    pub fn grow(&mut self, index: TakeIndex) -> bool {
+        let begin_of = |place: &SegmentPlace| place.times.begin;
+        let is_there = |place: &SegmentPlace| {
+            let found = index.segments().binary_search_by(|other| begin_of(other).total_cmp(&begin_of(place)));
+            found.is_ok_and(|number| SegmentPlace { offset: place.offset, ..index.segments()[number] } == *place)
+        };
+        let base_of = |index: &TakeIndex| (index.base().end - index.base().start, index.base_gaussians());
+        let same_base = base_of(&index) == base_of(&self.index);
+        let grown = same_base && self.index.segments().iter().all(is_there);
+        if grown {
+            self.index = index;
+        }
+        grown
+    }
+
+    /// Decodes the base, and returns what its stream says as JSON.
+    ///
+    /// # Errors
+    /// A damaged stream, a base that moves, or another number of Gaussians than the index says.
+    pub fn open_base(&mut self, stream: &[u8]) -> Result<String, CodecError> {
+        self.base = None;
+        let Decoded { scene, info, .. } = OpenStream::with_limits(stream, &take_limits())?.decode()?;
+        self.index.check_base(&info)?;
+        let facts = Facts { bytes: stream.len() as u64, layers: 1, shown: 1, sections: &[] };
+        let description = describe(&scene, &facts, levels(scene.gaussians.len()));
+        let mut base = Part::new(scene)?;
+        base.evaluate(0.0, 0, base.count());
+        self.base = Some(base);
+        Ok(description)
+    }
+
+    /// Checks and decodes a segment from its bytes in the file, into bytes that [`OpenTake::open_segment`] opens quickly: so
+    /// the decoding can be left to another instance, and the one that draws does not stop for it.
+    ///
+    /// # Errors
+    /// No such segment, or one that is damaged.
+    pub fn unpack_segment(&self, begin: f64, bytes: &[u8]) -> Result<Vec<u8>, CodecError> {
+        let (number, _) = self.find(begin)?;
+        let segment = self.index.open_segment(number, bytes)?;
+        let scene = decode_with_limits(&segment.stream, &take_limits())?;
+        Unpacked { scene, hidden: segment.hidden }.write()
+    }
+
+    /// Opens a segment that was unpacked. Returns the number of its Gaussians and of their levels of detail.
+    ///
+    /// # Errors
+    /// No such segment, or bytes of something else.
+    pub fn open_segment(&mut self, begin: f64, unpacked: &[u8]) -> Result<(usize, u32), CodecError> {
+        let (_, place) = self.find(begin)?;
+        let Unpacked { scene, hidden } = Unpacked::read(unpacked)?;
+        let count = scene.gaussians.len();
+        self.close_segment(begin);
+        self.segments.push(Segment { place, part: Part::new(scene)?, hidden });
+        Ok((count, levels(count)))
+    }
+
+    /// Frees a segment.
+    pub fn close_segment(&mut self, begin: f64) {
+        self.segments.retain(|segment| segment.place.times.begin != begin);
+        self.shown = None;
+    }
+
+    /// Chooses what is drawn: the base, and the segment of a time in seconds where it is open; and the level of detail of
+    /// both. Returns whether something was chosen of which nothing is evaluated yet.
+    pub fn show(&mut self, seconds: f64, level: u32) -> bool {
+        self.shown = self.segments.iter().position(|segment| segment.place.times.contains(seconds));
+        if let Some(base) = &mut self.base
+            && base.show_level(level)
+        {
+            base.evaluate(0.0, 0, base.count());
+        }
+        self.shown.is_some_and(|shown| self.segments[shown].part.show_level(level))
+    }
+
+    /// Number of Gaussians that [`OpenTake::evaluate`] moves: those of the segment, since the base stands still.
+    pub fn count(&self) -> usize {
+        self.shown.map_or(0, |shown| self.segments[shown].part.count())
+    }
+
+    /// Computes the Gaussians `first` to `last` of the segment at a time in seconds.
+    pub fn evaluate(&mut self, seconds: f64, first: usize, last: usize) {
+        if let Some(shown) = self.shown {
+            let Segment { place, part, .. } = &mut self.segments[shown];
+            part.evaluate(place.times.stream_time(seconds), first, last);
+        }
+    }
+
+    /// Base and segment as computed last, back to front, [`ENTRY`](crate::ENTRY) numbers each.
+    pub fn draw_list(&mut self, viewpoint: &Viewpoint) -> &[f32] {
+        let segment = self.shown.map(|shown| &self.segments[shown]);
+        let hidden = segment.map_or(&[][..], |segment| &segment.hidden);
+        let base = self.base.iter().map(|base| base.drawn(hidden));
+        let parts: Vec<_> = base.chain(segment.map(|segment| segment.part.drawn(&[]))).collect();
+        self.list.make(&parts, viewpoint)
+    }
+
+    /// The attributes of base and segment at a time in seconds, as of [`OpenScene::attributes_at`](crate::OpenScene::attributes_at),
+    /// and the degree of the harmonics.
+    pub fn attributes_at(&self, seconds: f64) -> (Vec<f32>, u8) {
+        let segment = self.segments.iter().find(|segment| segment.place.times.contains(seconds));
+        let moved = segment.map(|segment| segment.part.moved_at(segment.place.times.stream_time(seconds)));
+        let nothing = SceneData::default().gaussians;
+        let base = self.base.as_ref().map_or(&nothing, Part::canonical);
+        let drawn = drawn_together(base, segment.map_or(&[], |segment| &segment.hidden), moved.as_ref());
+        (activated(&drawn), drawn.sh_degree)
+    }
+
+    /// The number and the place of the segment with this begin.
+    fn find(&self, begin: f64) -> Result<(usize, SegmentPlace), CodecError> {
+        let mut places = self.index.segments().iter().enumerate();
+        let found = places.find(|(_, place)| place.times.begin == begin);
+        found.map(|(number, place)| (number, *place)).ok_or_else(|| CodecError::Invalid {
+            section: "take",
+            field: "begin of a segment".into(),
+            found: begin.to_string(),
+            expected: "that of a segment of the index".into(),
+        })
+    }
+}
+
+/// Limits for what another instance has unpacked: plain numbers are longer than what was coded.
+fn unpacked_limits() -> Limits {
+    Limits { memory_bytes: limits().memory_bytes.saturating_mul(4), ..limits() }
+}
+
+#[cfg(test)]
+mod tests;
