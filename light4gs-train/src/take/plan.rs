@@ -118,14 +118,15 @@ impl TakePlan {
         [segment.trained_first as f64 / last, end as f64 / last]
     }
 
-    /// The times of a segment in a file. The last one also shows the last frame's moment.
+    /// The times of a segment in a file. It changes hands half-way between two frames, so that no rounding gives a frame to the
+    /// wrong segment.
     pub fn times(&self, segment: &PlannedSegment) -> SegmentTimes {
-        let at = |frame: usize| frame as f64 * self.interval();
+        let at = |frame: f64| (frame * self.interval()).max(0.0);
         SegmentTimes {
-            begin: at(segment.first),
-            end: at(segment.first + segment.frames),
-            stream_begin: at(segment.trained_first),
-            stream_end: at(segment.trained_first + segment.trained_frames - 1),
+            begin: at(segment.first as f64 - 0.5),
+            end: at((segment.first + segment.frames) as f64 - 0.5),
+            stream_begin: at(segment.trained_first as f64),
+            stream_end: at((segment.trained_first + segment.trained_frames - 1) as f64),
             frames: segment.frames as u32,
         }
     }
@@ -151,7 +152,11 @@ mod tests {
         assert_eq!(next, 1800);
         let first = plan.times(&plan.segments[0]);
         let second = plan.times(&plan.segments[1]);
-        assert_eq!(first.end, second.begin);
+        assert_eq!((first.begin, first.end), (0.0, second.begin));
+        let frame = plan.segments[1].first as f64 * plan.interval();
+        assert!(!first.contains(frame) && second.contains(frame) && first.contains(frame - plan.interval()));
+        let last = plan.times(&plan.segments[29]);
+        assert!(last.contains(60.0) && last.stream_time(60.0) == 1.0);
         assert!(second.stream_begin < second.begin && second.end < second.stream_end);
     }
 

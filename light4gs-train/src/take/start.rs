@@ -23,7 +23,7 @@ use crate::stage::Stage;
 /// A pixel differs from the base from this mean absolute difference of a color on, of 1.
 const DIFFERS: f32 = 0.06;
 /// Differing pixels of a view for each point: densification adds what is missing.
-const PIXELS_A_POINT: usize = 4;
+const PIXELS_A_POINT: usize = 2;
 /// Points drawn for each that is kept.
 const DRAWN: usize = 20;
 /// They lie between this share of the base's depth and all of it.
