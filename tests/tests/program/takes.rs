@@ -110,6 +110,31 @@ fn the_first_part_plays_before_the_rest_is_trained() {
 }
 
 #[test]
+fn what_is_filmed_later_is_added_and_the_rest_stays() {
+    let w = filmed();
+    assert_success(&train(&w, "take", &[]).output().unwrap());
+    let read = || Take::read(fs::read(w.path("take/take.l4gs")).unwrap(), &Limits::default()).unwrap();
+    let before = read();
+    // With its own dataset there is nothing to add.
+    assert_success(&w.command(["extend", "take", "rig", "--quiet"]).output().unwrap());
+    let longer = ["--seconds", "4", "--cameras", "3", "--fps", "10", "--width", "48", "--height", "36"];
+    assert_success(&w.command(["synth", "longer"]).args(longer).output().unwrap());
+    assert_success(&w.command(["extend", "take", "longer", "--quiet"]).output().unwrap());
+    let after = read();
+    assert_eq!((before.len(), after.len()), (3, 4));
+    assert!(before.base().unwrap() == after.base().unwrap());
+    for number in 0..3 {
+        assert!(before.segment(number).unwrap().stream == after.segment(number).unwrap().stream, "segment {number}");
+    }
+    let times = after.index().segments()[3].times;
+    assert_eq!((times.frames, times.begin), (10, after.index().segments()[2].times.end));
+    assert!((after.meta().seconds - 3.9).abs() < 1e-6);
+    // Again there is nothing to do; a shorter take is none that goes on.
+    assert_success(&w.command(["extend", "take", "longer", "--quiet"]).output().unwrap());
+    assert_refused(&w.command(["extend", "take", "rig"]).output().unwrap(), &["30 frames", "more frames"]);
+}
+
+#[test]
 fn what_is_no_take_is_refused_with_a_remedy() {
     let w = filmed();
 
