@@ -80,6 +80,9 @@ impl ImageSource for MemoryImages {
     }
 }
 
+/// The slowest rate of frames that counts as one, a second.
+const SLOWEST: f64 = 1e-3;
+
 /// The options with which a dataset is opened for a configuration.
 pub fn load_options(config: &Config) -> LoadOptions {
     let other = LoadOptions::default();
@@ -96,7 +99,7 @@ pub fn load_options(config: &Config) -> LoadOptions {
         times: config.data.times.into(),
         cameras: config.data.cameras.into(),
         synchronize: config.data.synchronize,
-        frames_a_second: Some(config.data.frames_a_second).filter(|rate| *rate > 0.0),
+        frames_a_second: Some(config.data.frames_a_second).filter(|rate| *rate >= SLOWEST),
         between: Some(config.data.between).filter(|window| *window != [0.0, 1.0]),
         most_times: config.data.most_times,
     }
