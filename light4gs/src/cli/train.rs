@@ -236,7 +236,7 @@ fn finish(mut trainer: Trainer, folder: &RunFolder, config: &Config, output: &Ru
 
 #[derive(Debug, Args)]
 pub(super) struct Resume {
-    /// Folder of the run.
+    /// Folder of the run, or of a take.
     run: PathBuf,
     /// Changes one key of the run's configuration from now on, for example a learning rate that was too high; may be
     /// given more than once. The changed configuration must fit what has been trained.
@@ -255,6 +255,15 @@ pub(super) struct Resume {
 impl Resume {
     pub(super) fn run(self) -> Result<(), TrainError> {
         stop_flag();
+        if TakeFolder::is_one(&self.run) {
+            if !self.overrides.is_empty() || self.device.is_some() {
+                return Err(TrainError::Input(format!(
+                    "{} is a take, whose parts have one configuration: leave out --set and --device",
+                    self.run.display()
+                )));
+            }
+            return take::resume_take(&self.run, self.output.quiet);
+        }
         let (mut folder, record, found) = RunFolder::open(&self.run)?;
         folder.lock()?;
         let mut config = found.with(&Overrides::parse(&self.overrides)?)?;

@@ -107,6 +107,11 @@ fn the_first_part_plays_before_the_rest_is_trained() {
     assert_success(&output);
     let scores: Value = serde_json::from_slice(&output.stdout).unwrap();
     assert_eq!(scores["frames"].as_array().unwrap().len(), 10, "frames that no segment shows are left out");
+
+    assert_refused(&w.command(["resume", "take", "--set", "seed=1"]).output().unwrap(), &["is a take", "--set"]);
+    assert_success(&w.command(["resume", "take", "--quiet"]).output().unwrap());
+    let whole = Take::read(fs::read(w.path("take/take.l4gs")).unwrap(), &Limits::default()).unwrap();
+    assert_eq!((whole.len(), whole.segment_at(1.5)), (3, Some(1)));
 }
 
 #[test]

@@ -40,6 +40,11 @@ pub(super) struct LaunchOptions {
 }
 
 impl LaunchOptions {
+    /// One task after the other, on this machine.
+    pub(super) fn one_by_one() -> Self {
+        Self { launcher: Launcher::Local, jobs: 1, slurm: None }
+    }
+
     /// The settings of Slurm.
     ///
     /// # Errors

@@ -46,6 +46,11 @@ pub(super) fn train_take(
     train_missing(&folder, launch, quiet)
 }
 
+/// Goes on with the training of a take, one part after the other.
+pub(super) fn resume_take(root: &Path, quiet: bool) -> Result<(), TrainError> {
+    train_missing(&TakeFolder::open(root)?, &LaunchOptions::one_by_one(), quiet)
+}
+
 /// The length of a take.
 fn seconds_of(data: &Scene) -> Result<f64, TrainError> {
     data.seconds.ok_or_else(|| {
