@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 
 use light4gs_codec::take::{NewSegment, TakeMeta, write_take};
 use light4gs_codec::{Limits, legal_name, read_stream};
-use light4gs_data::{DataError, Scene, read_regular_file, write_atomically};
+use light4gs_data::{DataError, Scene, is_temporary_name, read_regular_file, sweep_leftovers, write_atomically};
 use light4gs_model::FieldKind;
 use serde::{Deserialize, Serialize};
 
@@ -73,10 +73,14 @@ impl TakeFolder {
             }
             return Ok(found);
         }
-        if root.read_dir().is_ok_and(|mut entries| entries.next().is_some()) {
-            return Err(TrainError::Input(format!("{} holds files but no take; name another folder", root.display())));
+        if let Some(name) = foreign(root) {
+            let root = root.display();
+            return Err(TrainError::Input(format!(
+                "{root} holds files but no take, among them `{name}`; name another folder"
+            )));
         }
         std::fs::create_dir_all(root).map_err(DataError::io("create", root))?;
+        sweep_leftovers(root);
         write_atomically(&root.join(CONFIG), |file| file.write_all(config.to_toml().as_bytes()))?;
         folder.write_record()?;
         Ok(folder)
@@ -227,6 +231,13 @@ impl TakeFolder {
         write_atomically(&self.file(), |file| file.write_all(&bytes))?;
         Ok(bytes.len() as u64)
     }
+}
+
+/// What lies in a folder and is not of a take that was stopped before it had its record.
+fn foreign(root: &Path) -> Option<String> {
+    let names = root.read_dir().into_iter().flatten().flatten();
+    let mut names = names.map(|entry| entry.file_name().to_string_lossy().into_owned());
+    names.find(|name| name != CONFIG && !is_temporary_name(name))
 }
 
 /// A bit for each Gaussian of the base, set where it is hidden; empty where none is.

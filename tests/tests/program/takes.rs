@@ -74,6 +74,9 @@ fn a_take_that_is_killed_ends_with_the_same_bytes() {
     let w = filmed();
     assert_success(&train(&w, "whole", &[]).output().unwrap());
     let expected = fs::read(w.path("whole/take.l4gs")).unwrap();
+    // Killed before there was a take.
+    fs::create_dir(w.path("killed")).unwrap();
+    fs::write(w.path("killed/config.toml"), "").unwrap();
     let mut kills = 0;
     for attempt in 1..200 {
         let mut child = train(&w, "killed", &[]).spawn().unwrap();
@@ -143,6 +146,7 @@ fn what_is_filmed_later_is_added_and_the_rest_stays() {
 fn what_is_no_take_is_refused_with_a_remedy() {
     let w = filmed();
 
+    assert_refused(&train(&w, "rig", &[]).output().unwrap(), &["rig holds files but no take"]);
     assert_refused(&w.command(["join", "rig"]).output().unwrap(), &["take.json"]);
     let jobs = w.command(["train", "rig", "--out", "x", "--jobs", "2"]).output().unwrap();
     assert_refused(&jobs, &["--jobs", "--segment"]);
