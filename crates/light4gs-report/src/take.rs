@@ -12,18 +12,23 @@ pub fn take_page(title: &str, evaluation: &TakeEvaluation) -> String {
         evaluation.bytes, evaluation.segments, evaluation.kilobytes_a_frame, evaluation.base_bytes
     );
     let charts = [
-        chart("PSNR of test views, dB", evaluation, &|frame| (frame.split == "test").then_some(frame.psnr), &at_join),
-        chart("SSIM of test views", evaluation, &|frame| (frame.split == "test").then_some(frame.ssim), &at_join),
+        chart(
+            "PSNR of test views, dB",
+            evaluation,
+            &|frame| (frame.split == "test").then_some(frame.psnr),
+            &TakeFrame::is_at_join,
+        ),
+        chart(
+            "SSIM of test views",
+            evaluation,
+            &|frame| (frame.split == "test").then_some(frame.ssim),
+            &TakeFrame::is_at_join,
+        ),
         chart("Flicker, shares of white", evaluation, &|frame| frame.flicker, &|frame| frame.crosses_join),
     ];
     let sections =
         [("Joins", table(evaluation)), ("By second", format!("<div class=\"charts\">\n{}</div>\n", charts.concat()))];
     page_of(title, &about, &sections.map(|(heading, html)| (heading.to_owned(), html)))
-}
-
-/// Frames that count as being at a join.
-fn at_join(frame: &TakeFrame) -> bool {
-    frame.from_join <= light4gs_train::take::AT_JOIN
 }
 
 fn chart(

@@ -10,7 +10,7 @@ use crate::error::TrainError;
 use crate::metrics::{image_tensor, psnr, ssim};
 
 /// Frames on each side of a join that count as being at it.
-pub const AT_JOIN: usize = 5;
+const AT_JOIN: usize = 5;
 
 /// A frame of the dataset, and how the take shows it.
 #[derive(Clone, Debug, Serialize)]
@@ -21,10 +21,10 @@ pub struct TakeFrame {
     pub split: String,
     /// Seconds of the take.
     pub seconds: f64,
-    /// The segment that shows it; `None` where there is none yet.
-    pub segment: Option<usize>,
-    /// Frames to the nearest join.
-    pub from_join: usize,
+    /// The segment that shows it.
+    pub segment: usize,
+    /// Frames to the nearest join; `None` where the take has none.
+    pub from_join: Option<usize>,
     /// dB.
     pub psnr: f64,
     /// SSIM.
@@ -34,6 +34,13 @@ pub struct TakeFrame {
     pub flicker: Option<f64>,
     /// Whether a join lies between this frame and the one before.
     pub crosses_join: bool,
+}
+
+impl TakeFrame {
+    /// Whether it is within five frames of a join.
+    pub fn is_at_join(&self) -> bool {
+        self.from_join.is_some_and(|frames| frames <= AT_JOIN)
+    }
 }
 
 /// A mean at joins and elsewhere.
@@ -106,8 +113,8 @@ pub fn evaluate_take(
             name: frame.name.clone(),
             split: split.name().to_owned(),
             seconds: at,
-            segment: Some(segment),
-            from_join: from_join.min().unwrap_or(usize::MAX),
+            segment,
+            from_join: from_join.min(),
             psnr: psnr(render.clone(), truth.clone()),
             ssim: f64::from(ssim(render, truth).into_scalar::<f32>()),
             flicker: follows.map(|before| before.flicker(&shown)),
@@ -118,7 +125,7 @@ pub fn evaluate_take(
     let shown: u32 = index.segments().iter().map(|segment| segment.times.frames).sum();
     let is_test = |frame: &&TakeFrame| frame.split == Split::Test.name();
     let quality = |of: fn(&TakeFrame) -> f64| {
-        scores(measured.iter().filter(is_test).map(|frame| (of(frame), frame.from_join <= AT_JOIN)))
+        scores(measured.iter().filter(is_test).map(|frame| (of(frame), frame.is_at_join())))
     };
     Ok(TakeEvaluation {
         bytes,
@@ -170,8 +177,7 @@ fn frames(data: &Scene) -> Vec<(Split, &Frame)> {
 }
 
 fn render(take: &PlayableTake, frame: &Frame, seconds: f64, background: [f32; 3]) -> Result<RgbImage8, TrainError> {
-    let mut pixels = take.render(&frame.camera, seconds, background)?;
-    pixels.iter_mut().for_each(|value| *value = value.clamp(0.0, 1.0));
+    let pixels = take.render(&frame.camera, seconds, background)?;
     Ok(RgbImage32 { width: frame.camera.width, height: frame.camera.height, pixels }.to_u8())
 }
 

@@ -23,7 +23,7 @@ mod residual;
 mod start;
 
 pub use base::{Base, HIDDEN, backdrop_of};
-pub use evaluation::{AT_JOIN, JoinScores, TakeEvaluation, TakeFrame, evaluate_take};
+pub use evaluation::{JoinScores, TakeEvaluation, TakeFrame, evaluate_take};
 pub use folder::{TakeFolder, TakeRecord};
 pub use plan::{PlannedSegment, TakePlan};
 pub use start::Start;

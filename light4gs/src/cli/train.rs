@@ -103,9 +103,11 @@ impl Train {
             return Err(TrainError::Input("--jobs and --launcher are for takes; give --segment SECONDS too".into()));
         }
         if self.segment.is_some() {
-            self.wishes.refuse_targets()?;
+            self.wishes.refuse_for_several()?;
         }
-        let config = self.wishes.config(&preset, &overrides, &scene, automatic, self.output.quiet)?;
+        // What is announced is the time of one training.
+        let quiet = self.output.quiet || self.segment.is_some();
+        let config = self.wishes.config(&preset, &overrides, &scene, automatic, quiet)?;
         match self.segment {
             Some(segment) => train_take(&config, &scene, &self.out, segment, &self.launch, self.output.quiet),
             None => train(config, &scene, &self.out, self.overwrite, &self.output),

@@ -39,16 +39,20 @@ pub(super) struct Wishes {
 }
 
 impl Wishes {
-    /// Refuses a wish for the size or the quality of one file, for trainings that write several.
+    /// Refuses a wish for the time of one training, or for the size or the quality of one file, where there are several.
     ///
     /// # Errors
     /// [`TrainError::Input`] with what to give in its place.
-    pub(super) fn refuse_targets(&self) -> Result<(), TrainError> {
-        let named = [("--target-bytes", self.target_bytes.is_some()), ("--target-db", self.target_db.is_some())];
+    pub(super) fn refuse_for_several(&self) -> Result<(), TrainError> {
+        let named = [
+            ("--minutes", self.minutes.is_some()),
+            ("--target-bytes", self.target_bytes.is_some()),
+            ("--target-db", self.target_db.is_some()),
+        ];
         match named.iter().find(|(_, given)| *given) {
             Some((name, _)) => Err(TrainError::Input(format!(
                 "{name} is for one scene, and --segment trains several; give a preset of a size, such as `+medium` or \
-                 `+small`, or `--set compression.rate.attribute_lambda=...`"
+                 `+small`, or the keys that you mean by --set"
             ))),
             None => Ok(()),
         }

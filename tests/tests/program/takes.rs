@@ -152,6 +152,7 @@ fn what_is_no_take_is_refused_with_a_remedy() {
     assert_refused(&jobs, &["--jobs", "--segment"]);
     let target = train(&w, "x", &["--target-bytes", "100k"]).output().unwrap();
     assert_refused(&target, &["--target-bytes", "--segment"]);
+    assert_refused(&train(&w, "x", &["--minutes", "1"]).output().unwrap(), &["--minutes", "--segment"]);
     // A scene whose time is not known.
     assert_success(&w.command(["synth", "plain", "--resolution", "32", "--train-frames", "12"]).output().unwrap());
     let unknown = w.command(["train", "plain", "--segment", "1", "--out", "y", "--device", "flex"]).output().unwrap();

@@ -1,7 +1,7 @@
 //! A take that is shown: its file, or a take in training, whose file is written anew as segments are finished.
 
 use std::path::{Path, PathBuf};
-use std::sync::{Arc, Mutex, PoisonError, TryLockError};
+use std::sync::{Arc, Mutex, PoisonError};
 use std::time::SystemTime;
 
 use light4gs_codec::Limits;
@@ -64,15 +64,9 @@ impl TakeSource {
         path.file_name().map_or_else(|| "Take".into(), |name| name.to_string_lossy().into_owned())
     }
 
-    /// Joins what is new in the folder, unless somebody else is at it, and looks whether the file has changed.
+    /// Joins what is new in the folder, and looks whether the file has changed.
     pub(super) fn newest(&self) -> TakeState {
-        let mut state = match self.state.try_lock() {
-            Ok(state) => state,
-            Err(TryLockError::Poisoned(poisoned)) => poisoned.into_inner(),
-            Err(TryLockError::WouldBlock) => {
-                return self.state.lock().unwrap_or_else(PoisonError::into_inner).clone();
-            }
-        };
+        let mut state = self.state.lock().unwrap_or_else(PoisonError::into_inner);
         if let Some(folder) = &self.folder {
             state.status = self.join(folder, &mut state).unwrap_or_else(|error| error.to_string());
         }
