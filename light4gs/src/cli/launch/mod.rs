@@ -64,6 +64,8 @@ impl LaunchOptions {
 pub(super) trait TaskFolder {
     /// The hidden command that runs one task: `PROGRAM COMMAND FOLDER NUMBER`.
     const TASK: &'static str;
+    /// The name of its jobs on a cluster.
+    const JOBS: &'static str;
     /// The command that puts together what the tasks have made: `PROGRAM COMMAND FOLDER`.
     const GATHER: &'static str;
 

@@ -117,8 +117,8 @@ pub(in crate::cli) fn submit<T: TaskFolder>(
         command.args(settings.common()).args(settings.of_tasks());
         command.args(array.map(|job| format!("--dependency=afterok:{job}")));
         command.arg(format!("--array={}{}", ranges(tasks), if jobs > 1 { format!("%{jobs}") } else { String::new() }));
-        command.arg("--job-name=light4gs").arg(format!("--output={}", logs.join("task-%a.log").display()));
-        command.arg(&task_script).arg(&program).arg(T::TASK).arg(&root).arg(settings.restarts.to_string());
+        command.arg(format!("--job-name={}", T::JOBS)).arg(format!("--output={}", logs.join("task-%a.log").display()));
+        command.arg(&task_script).arg(&program).arg(settings.restarts.to_string()).arg(T::TASK).arg(&root);
         let job = sbatch(command)?;
         say(format_args!("{} tasks in job array {job}", tasks.len()))?;
         array = Some(job);
@@ -126,7 +126,9 @@ pub(in crate::cli) fn submit<T: TaskFolder>(
     let mut command = Command::new("sbatch");
     command.args(settings.common());
     command.args(array.map(|job| format!("--dependency=afterany:{job}")));
-    command.arg("--job-name=light4gs-gather").arg(format!("--output={}", logs.join("gather.log").display()));
+    command
+        .arg(format!("--job-name=light4gs-{}", T::GATHER))
+        .arg(format!("--output={}", logs.join("gather.log").display()));
     command.arg(gather_script).arg(&program).arg(T::GATHER).arg(&root);
     let job = sbatch(command)?;
     say(format_args!(

@@ -1,6 +1,6 @@
 #!/bin/bash
-# One task as a job of an array: PROGRAM COMMAND FOLDER RESTARTS. Written by `light4gs ... --launcher slurm`.
-program=$1 command=$2 folder=$3 restarts=$4
+# One task as a job of an array: PROGRAM RESTARTS COMMAND FOLDER. Written by `light4gs ... --launcher slurm`.
+program=$1 restarts=$2 command=$3 folder=$4
 
 "$program" "$command" "$folder" "$SLURM_ARRAY_TASK_ID" --quiet &
 task=$!

@@ -26,6 +26,7 @@ use super::output::{say, say_json};
 
 impl TaskFolder for StudyFolder {
     const TASK: &'static str = "study-task";
+    const JOBS: &'static str = "light4gs-study";
     const GATHER: &'static str = "gather";
 
     fn root(&self) -> &Path {

@@ -24,6 +24,7 @@ const BASE: usize = 0;
 
 impl TaskFolder for TakeFolder {
     const TASK: &'static str = "take-task";
+    const JOBS: &'static str = "light4gs-take";
     const GATHER: &'static str = "join";
 
     fn root(&self) -> &Path {
