@@ -135,7 +135,7 @@ impl TakePlan {
 
     /// How many clips of the length of a segment would take as long to train.
     pub fn clips(&self) -> f64 {
-        self.base_growth + self.segments.len() as f64
+        self.base_growth.powi(2) + self.segments.len() as f64
     }
 
     /// The base's share of the bytes of a file that is to have a certain size.
