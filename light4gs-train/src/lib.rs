@@ -41,7 +41,7 @@
 //! let synthetic = SyntheticOptions { resolution: 32, train_frames: 4, test_frames: 1, val_frames: 0, seed: 0 };
 //! write_synthetic(&root, &synthetic)?;
 //!
-//! let mut config = Config::from_preset("dnerf-cpu")?;
+//! let mut config = Config::from_preset("hexplane-dnerf-cpu")?;
 //! config.device = DeviceName::Flex;
 //! config.train.coarse_iterations = 1;
 //! config.train.fine_iterations = 2;

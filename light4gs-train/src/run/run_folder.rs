@@ -65,7 +65,7 @@ impl RunRecord {
             scene,
             version: env!("CARGO_PKG_VERSION").to_owned(),
             commit: env!("LIGHT4GS_COMMIT").to_owned(),
-            device: config.device.to_string(),
+            device: crate::device::chosen(config.device).to_string(),
             threads: rayon::current_num_threads(),
             begun: utc::now(),
             configuration: config.digest_text(),

@@ -51,8 +51,8 @@ pub(super) struct Train {
     /// the folder OUT-prepared (see `light4gs prepare`). An interrupted command continues where it stopped.
     #[arg(required = true, value_name = "SCENE|VIDEO")]
     scene: Vec<PathBuf>,
-    /// A preset (see docs/configuration.md) or a TOML file. Without it: the preset of the dataset's layout, such as
-    /// dnerf-cpu+nodes.
+    /// A preset (see docs/configuration.md) or a TOML file. Without it: the preset of the dataset's layout, such as dnerf, with
+    /// control nodes. The paper's hexplane: hexplane-dnerf-cpu, paper-dnerf+paper-coding.
     #[arg(long, value_name = "PRESET|FILE")]
     config: Option<String>,
     /// Layout of the dataset; without it, it is found by content (see docs/data.md).
@@ -64,7 +64,7 @@ pub(super) struct Train {
     /// Changes one key of the configuration; may be given more than once.
     #[arg(long = "set", value_name = "KEY=VALUE")]
     overrides: Vec<String>,
-    /// Back end: ndarray, flex, wgpu, or wgpu with an adapter such as wgpu:0.
+    /// Back end: auto (a graphics card where there is one), ndarray, flex, wgpu, or wgpu with an adapter such as wgpu:0.
     #[arg(long)]
     device: Option<DeviceName>,
     #[command(flatten)]
@@ -105,14 +105,29 @@ impl Train {
         }
         let Some(length) = self.segment else {
             let config = self.wishes.config(&preset, &overrides, &scene, automatic, self.output.quiet)?;
-            return train(config, &scene, &self.out, self.overwrite, &self.output);
+            return train(on_chosen_device(config), &scene, &self.out, self.overwrite, &self.output);
         };
         let plan = plan_of(&Config::load(&preset, &overrides)?, &scene, length)?;
-        // On a cluster each job has a machine; jobs here share one.
-        let machines = if self.launch.launcher == Launcher::Slurm { self.launch.jobs } else { 1 };
+        // On a cluster each job has a machine, and its own devices; jobs here share them.
+        let on_cluster = self.launch.launcher == Launcher::Slurm;
+        let machines = if on_cluster { self.launch.jobs } else { 1 };
         let config = self.wishes.config_of_take(&preset, &overrides, &scene, automatic, &plan, machines)?;
+        let config = if on_cluster { config } else { on_chosen_device(config) };
         train_take(&config, &scene, &self.out, plan, &self.launch, self.output.quiet)
     }
+}
+
+/// The configuration with the device that `auto` means here, which is said, so that a run that is resumed has the same.
+fn on_chosen_device(config: Config) -> Config {
+    let device = device::chosen(config.device);
+    if config.device == DeviceName::Auto {
+        let why = match device {
+            DeviceName::Wgpu(_) => "a graphics card; --device flex computes on the processor",
+            _ => "no graphics card was found",
+        };
+        tell(format_args!("device: {device} ({why})"));
+    }
+    Config { device, ..config }
 }
 
 /// Captures that last longer, in seconds, are better trained in segments.
@@ -295,7 +310,7 @@ pub(super) struct Eval {
     /// Folder of the dataset, if it is not the run's own.
     #[arg(long)]
     scene: Option<PathBuf>,
-    /// Back end: ndarray, flex, wgpu, or wgpu with an adapter such as wgpu:0.
+    /// Back end: auto (a graphics card where there is one), ndarray, flex, wgpu, or wgpu with an adapter such as wgpu:0.
     #[arg(long)]
     device: Option<DeviceName>,
     /// Weights of LPIPS (see docs/metrics.md), in place of the configuration's `eval.lpips`; may be given more than once.

@@ -19,7 +19,7 @@ fn filmed() -> Workspace {
 }
 
 fn train(w: &Workspace, run: &str, more: &[&str]) -> Command {
-    let mut command = w.command(["train", "rig", "--config", "dnerf-cpu", "--out", run, "--quiet"]);
+    let mut command = w.command(["train", "rig", "--config", "hexplane-dnerf-cpu", "--out", run, "--quiet"]);
     if !more.contains(&"--segment") {
         command.args(["--segment", "1"]);
     }

@@ -64,7 +64,7 @@ fn scene(config: &Config, device: &Device) -> DynamicScene {
 /// [`TrainError::Input`] if this build has no back end.
 pub fn codec_benchmark(repeats: usize) -> Result<Vec<CoderTime>, TrainError> {
     let device = light4gs_train::device::any()?;
-    let config = Config::from_preset("dnerf")?;
+    let config = Config::from_preset("hexplane-dnerf")?;
     let scene = scene(&config, &device);
     let mut compression = Compression::new(&ConfiguredModels, &config, scene.planes(), &device)?;
     compression.start_from(scene.planes());

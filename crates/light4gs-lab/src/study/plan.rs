@@ -252,7 +252,7 @@ value = [{ name = "three", label = "degree 3" }, { name = "one", set = ["model.s
 
     fn options(scene: &Path) -> PlanOptions {
         PlanOptions {
-            config: Some("dnerf-cpu".into()),
+            config: Some("hexplane-dnerf-cpu".into()),
             scenes: vec![scene.into()],
             schedule: None,
             overrides: Vec::new(),
@@ -292,7 +292,7 @@ value = [{ name = "three", label = "degree 3" }, { name = "one", set = ["model.s
         let overrides = vec!["train.coarse_iterations=7".to_owned()];
         let options = PlanOptions { schedule: Some(0.1), overrides, ..options(&scene) };
         let plan = Plan::new(study(&axes), &options).unwrap();
-        let usual = Config::load("dnerf-cpu", &[]).unwrap().train.fine_iterations;
+        let usual = Config::load("hexplane-dnerf-cpu", &[]).unwrap().train.fine_iterations;
         let fine = |run: usize| plan.runs[run].config.train.fine_iterations;
         assert_eq!([fine(0), fine(2)], [usual / 10, usual / 20]);
         assert!(plan.runs.iter().all(|run| run.config.train.coarse_iterations == 7));
@@ -320,7 +320,11 @@ value = [{ name = "three", label = "degree 3" }, { name = "one", set = ["model.s
         refused(wrong, good.clone(), &["strong", "compression.rate.lambda", "must be 0 to"]);
         refused(study(&LAMBDAS.replace("rate.lambda=0.05", "rate.lamda=0.05")), good.clone(), &["strong", "lambda"]);
         refused(study(&format!("reference = \"weak\"\n{LAMBDAS}")), good.clone(), &["weak", "one of none"]);
-        refused(study(LAMBDAS), PlanOptions { config: Some("dnerf-{scene}".into()), ..good }, &["dnerf-scene"]);
+        refused(
+            study(LAMBDAS),
+            PlanOptions { config: Some("hexplane-dnerf-{scene}".into()), ..good },
+            &["dnerf-scene"],
+        );
     }
 
     #[test]
@@ -329,7 +333,7 @@ value = [{ name = "three", label = "degree 3" }, { name = "one", set = ["model.s
         let scene = folder.path().join("flag");
         std::fs::create_dir(&scene).unwrap();
         for name in super::super::catalog::NAMES {
-            for config in [Some("dnerf-{scene}-cpu"), Some("dnerf-{scene}"), None] {
+            for config in [Some("hexplane-dnerf-{scene}-cpu"), Some("hexplane-dnerf-{scene}"), None] {
                 let options = PlanOptions { config: config.map(str::to_owned), ..options(&scene) };
                 let plan = Plan::new(Study::load(name).unwrap(), &options).unwrap_or_else(|e| panic!("{name}: {e}"));
                 assert!(!plan.runs.is_empty(), "{name}");

@@ -48,7 +48,7 @@ pub(super) struct Study {
     /// the file is written are trained once.
     #[arg(long)]
     out: Option<PathBuf>,
-    /// The preset or TOML file that every variant starts from, in place of dnerf-cpu or the study's own; {scene} in it
+    /// The preset or TOML file that every variant starts from, in place of hexplane-dnerf-cpu or the study's own; {scene} in it
     /// stands for the scene's name.
     #[arg(long, value_name = "PRESET|FILE")]
     config: Option<String>,
@@ -58,7 +58,7 @@ pub(super) struct Study {
     /// Changes one key of every variant's configuration; may be given more than once.
     #[arg(long = "set", value_name = "KEY=VALUE")]
     overrides: Vec<String>,
-    /// Back end: ndarray, flex, wgpu, or wgpu with an adapter such as wgpu:0.
+    /// Back end: auto (a graphics card where there is one), ndarray, flex, wgpu, or wgpu with an adapter such as wgpu:0.
     #[arg(long)]
     device: Option<DeviceName>,
     /// Runs of each variant on each scene, with different seeds: tables then show mean and standard deviation.
