@@ -78,6 +78,7 @@ pub mod metrics;
 pub mod observers;
 pub mod optimization;
 pub mod pace;
+pub mod provenance;
 mod randomness;
 pub mod regularizer;
 pub mod run;

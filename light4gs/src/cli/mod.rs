@@ -2,6 +2,7 @@
 
 mod bench;
 mod check;
+mod command_line;
 mod compare;
 mod container;
 mod export;

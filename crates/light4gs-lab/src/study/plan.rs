@@ -27,6 +27,8 @@ pub struct PlanOptions {
     pub seeds: u64,
     /// Folders of other studies, whose trainings are reused.
     pub reuse: Vec<PathBuf>,
+    /// The command that asks for the study, for its record; empty if there is none.
+    pub command: String,
 }
 
 /// One combination of the axes' values.
@@ -81,6 +83,8 @@ pub struct Plan {
     pub runs: Vec<PlannedRun>,
     /// Absolute paths of other studies, whose trainings are reused.
     pub reuse: Vec<PathBuf>,
+    /// The command that asks for the study, for its record.
+    pub command: String,
 }
 
 impl Plan {
@@ -123,7 +127,8 @@ impl Plan {
         }
         let absolute = |path: &PathBuf| std::fs::canonicalize(path).map_err(DataError::io("read", path));
         let reuse = options.reuse.iter().map(absolute).collect::<Result<Vec<_>, _>>()?;
-        Ok(Self { study, variants, scenes, seeds: options.seeds, runs, reuse })
+        let command = options.command.clone();
+        Ok(Self { study, variants, scenes, seeds: options.seeds, runs, reuse, command })
     }
 
     /// Number of tasks.
@@ -258,6 +263,7 @@ value = [{ name = "three", label = "degree 3" }, { name = "one", set = ["model.s
             overrides: Vec::new(),
             seeds: 1,
             reuse: Vec::new(),
+            command: String::new(),
         }
     }
 

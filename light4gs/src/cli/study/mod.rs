@@ -21,6 +21,7 @@ use serde::Serialize;
 pub(super) use gather::Gather;
 pub(super) use task::StudyTask;
 
+use super::command_line::command_line;
 use super::launch::{LaunchOptions, Launcher, TaskFolder, local, slurm};
 use super::output::{say, say_json};
 
@@ -93,7 +94,8 @@ impl Study {
         overrides.extend(self.device.map(|device| format!("device={device}")));
         let (config, scenes, schedule) = (self.config, self.scenes, self.schedule);
         let (seeds, reuse) = (self.seeds, self.reuse);
-        let options = PlanOptions { config, scenes, schedule, overrides, seeds, reuse };
+        let command = command_line();
+        let options = PlanOptions { config, scenes, schedule, overrides, seeds, reuse, command };
         let plan = Plan::new(Definition::load(&self.name)?, &options)?;
         for study in &plan.reuse {
             StudyFolder::open(study)?;
