@@ -1,11 +1,11 @@
 // Takes through the player's decoder, that of bindings/web/dist: hostile-streams --what records | node player.mjs [SECONDS]
 // It ends after SECONDS of the processor. `records.py` says what a record is, and when an answer is right.
 
-import { readFileSync } from "node:fs";
-import { crc32, gunzipSync } from "node:zlib";
+import { crc32 } from "node:zlib";
 import { SceneError } from "../../../bindings/web/player/errors.js";
 import { Decoder } from "../../../bindings/web/player/scene/decoder.js";
 import { TakeDecoder } from "../../../bindings/web/player/take/take_decoder.js";
+import { decoderModule } from "../../../bindings/web/tests/bundled_decoder.mjs";
 
 /** One instance has the base, a segment as it was unpacked, and the same as it is drawn. */
 const MOST_MIB = 4 * 256;
@@ -14,10 +14,6 @@ const MOST_SECONDS = 4;
 const VIEW = { row: [0, 0, 1, 4], eye: [0, 0, -4], spread: Infinity };
 
 const [seconds = "Infinity"] = process.argv.slice(2);
-const bundle = readFileSync(new URL("../../../bindings/web/dist/light4gs-player.js", import.meta.url), "utf8");
-// The only long text in the bundle that begins like gzip.
-const packed = bundle.match(/H4sI[A-Za-z0-9+/]{10000,}=*/)[0];
-const module = new WebAssembly.Module(gunzipSync(Buffer.from(packed, "base64")));
 
 const processorTime = () => (process.cpuUsage().user + process.cpuUsage().system) / 1e6;
 
@@ -88,7 +84,7 @@ async function centersAt(decoder, take, index, bytes, time, large) {
 
 /** What is wrong with the player's answers, whether something was shown, and the memory. */
 async function check(record, bytes, mostTime) {
-  const decoder = new Decoder(module);
+  const decoder = new Decoder(decoderModule);
   const take = new TakeDecoder(decoder);
   let shown = false;
   let fault = null;
