@@ -12,11 +12,11 @@ use light4gs_codec::CodecError;
 pub enum L4gsStatus {
     /// All is well.
     Ok = 0,
-    /// An argument is wrong: a null pointer, a time outside of [0, 1], an illegal camera, a buffer that is too short.
+    /// An argument is wrong: a null pointer, a time that is not there, an illegal camera, a buffer that is too short.
     Argument = 1,
     /// The operating system refuses to read the file.
     File = 2,
-    /// The bytes are no `.l4gs` stream.
+    /// The bytes are no `.l4gs` stream; or they are a take where a scene is expected, or a scene where a take is.
     NotL4gs = 3,
     /// The stream needs a newer version of this library.
     Newer = 4,
@@ -24,7 +24,7 @@ pub enum L4gsStatus {
     Damaged = 5,
     /// Something is larger than the limits allow.
     OverLimit = 6,
-    /// A fault of this library. The scene can still be used and closed.
+    /// A fault of this library. The scene or take can still be used and closed.
     Internal = 7,
 }
 
@@ -55,7 +55,7 @@ impl From<CodecError> for Failure {
         let kind = error.kind();
         let status = match kind {
             "io" => L4gsStatus::File,
-            "not-l4gs" | "is-take" => L4gsStatus::NotL4gs,
+            "not-l4gs" | "not-take" | "is-take" => L4gsStatus::NotL4gs,
             "newer-version" | "unknown-section" | "unknown-kind" | "unknown-encoding" | "unknown-attribute" => {
                 L4gsStatus::Newer
             }
@@ -63,7 +63,13 @@ impl From<CodecError> for Failure {
             "self-check" => L4gsStatus::Internal,
             _ => L4gsStatus::Damaged,
         };
-        Self { status, kind, message: error.to_string() }
+        // The message names what opens the file from Rust.
+        let here = match kind {
+            "is-take" => "; from C l4gs_take_open_file",
+            "not-take" => "; from C l4gs_open_file",
+            _ => "",
+        };
+        Self { status, kind, message: format!("{error}{here}") }
     }
 }
 

@@ -1,14 +1,13 @@
-//! The functions.
+//! The functions about this library, and about scenes.
 
 use std::ffi::{CStr, c_char};
-use std::path::Path;
 
-use glam::{DMat3, DVec3};
 use light4gs_codec::{Limits, sh_rest_coefficients};
-use light4gs_data::{Camera, Intrinsics};
 use light4gs_render::PlayableScene;
-use light4gs_render::conventions::{Gsplat, Inria};
 
+use crate::caller::{
+    self, Picture, check_count, fill_extra, fill_gsplat, fill_inria, handed_out, no_such, refuse_null, taken_back,
+};
 use crate::failure::{Failure, L4gsStatus, guarded, last};
 use crate::scene::L4gsScene;
 use crate::types::{L4gsCamera, L4gsGsplatArrays, L4gsInfo, L4gsInriaArrays, L4gsLimits};
@@ -60,20 +59,13 @@ pub unsafe extern "C" fn l4gs_open_file(
     limits: *const L4gsLimits,
     scene: *mut *mut L4gsScene,
 ) -> L4gsStatus {
-    guarded(|| {
-        refuse_null("scene", scene)?;
-        // SAFETY: it is not null, and the caller says that it points to a pointer.
-        unsafe { scene.write(std::ptr::null_mut()) };
-        refuse_null("path", path)?;
-        // SAFETY: it is not null, and the caller says that it is a string.
-        let path = unsafe { CStr::from_ptr(path) };
-        // SAFETY: the caller's words.
-        let limits = unsafe { limits_of(limits) };
-        let opened = PlayableScene::open(path_of(path)?, &limits)?;
-        // SAFETY: as above.
-        unsafe { scene.write(Box::into_raw(Box::new(L4gsScene::new(opened)))) };
-        Ok(())
-    })
+    // SAFETY: the caller's words.
+    unsafe {
+        handed_out("scene", scene, || {
+            let path = caller::path(path)?;
+            Ok(L4gsScene::new(PlayableScene::open(path, &caller::limits(limits))?))
+        })
+    }
 }
 
 /// Opens a stream in memory. The bytes are not needed afterwards. Otherwise as `l4gs_open_file`.
@@ -88,23 +80,13 @@ pub unsafe extern "C" fn l4gs_open_bytes(
     limits: *const L4gsLimits,
     scene: *mut *mut L4gsScene,
 ) -> L4gsStatus {
-    guarded(|| {
-        refuse_null("scene", scene)?;
-        // SAFETY: it is not null, and the caller says that it points to a pointer.
-        unsafe { scene.write(std::ptr::null_mut()) };
-        refuse_null("bytes", bytes)?;
-        if isize::try_from(length).is_err() {
-            return Err(Failure::argument("length is more than the memory of this machine can hold"));
-        }
-        // SAFETY: not null, not too long, and the caller promises `length` bytes.
-        let bytes = unsafe { std::slice::from_raw_parts(bytes, length) };
-        // SAFETY: the caller's words.
-        let limits = unsafe { limits_of(limits) };
-        let opened = PlayableScene::decode(bytes, &limits)?;
-        // SAFETY: as above.
-        unsafe { scene.write(Box::into_raw(Box::new(L4gsScene::new(opened)))) };
-        Ok(())
-    })
+    // SAFETY: the caller's words.
+    unsafe {
+        handed_out("scene", scene, || {
+            let bytes = caller::bytes(bytes, length)?;
+            Ok(L4gsScene::new(PlayableScene::decode(bytes, &caller::limits(limits))?))
+        })
+    }
 }
 
 /// Closes a scene; null is allowed. All pointers that came from it become invalid.
@@ -113,13 +95,8 @@ pub unsafe extern "C" fn l4gs_open_bytes(
 /// `scene` is null, or was opened, has not been closed, and is not in use by another thread.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn l4gs_close(scene: *mut L4gsScene) {
-    guarded(|| {
-        if !scene.is_null() {
-            // SAFETY: it came from `Box::into_raw`, and the caller says that nobody uses it.
-            drop(unsafe { Box::from_raw(scene) });
-        }
-        Ok(())
-    });
+    // SAFETY: the caller's words.
+    unsafe { taken_back(scene) }
 }
 
 /// Fills `*info` with counts and metadata.
@@ -130,7 +107,7 @@ pub unsafe extern "C" fn l4gs_close(scene: *mut L4gsScene) {
 pub unsafe extern "C" fn l4gs_info(scene: *const L4gsScene, info: *mut L4gsInfo) -> L4gsStatus {
     guarded(|| {
         // SAFETY: the caller's words.
-        let scene = unsafe { open(scene) }?;
+        let scene = unsafe { caller::open("scene", scene) }?;
         refuse_null("info", info)?;
         let stream = scene.playable.info();
         let meta = &stream.meta;
@@ -166,7 +143,7 @@ pub unsafe extern "C" fn l4gs_name(scene: *const L4gsScene) -> *const c_char {
     let mut name = std::ptr::null();
     guarded(|| {
         // SAFETY: the caller's words.
-        name = unsafe { open(scene) }?.name.as_ptr();
+        name = unsafe { caller::open("scene", scene) }?.name.as_ptr();
         Ok(())
     });
     name
@@ -185,17 +162,9 @@ pub unsafe extern "C" fn l4gs_extra(
 ) -> L4gsStatus {
     guarded(|| {
         // SAFETY: the caller's words.
-        let scene = unsafe { open(scene) }?;
-        refuse_null("key", key)?;
-        refuse_null("value", value)?;
-        let entry = scene.extras.get(index as usize);
-        let (found_key, found_value) = entry.ok_or_else(|| no_such("extra entry", index, scene.extras.len()))?;
-        // SAFETY: neither is null, and the caller says that both point to pointers.
-        unsafe {
-            key.write(found_key.as_ptr());
-            value.write(found_value.as_ptr());
-        }
-        Ok(())
+        let scene = unsafe { caller::open("scene", scene) }?;
+        // SAFETY: the caller's words.
+        unsafe { fill_extra(&scene.extras, index, key, value) }
     })
 }
 
@@ -212,7 +181,7 @@ pub unsafe extern "C" fn l4gs_section(
 ) -> L4gsStatus {
     guarded(|| {
         // SAFETY: the caller's words.
-        let scene = unsafe { open(scene) }?;
+        let scene = unsafe { caller::open("scene", scene) }?;
         refuse_null("name", name)?;
         refuse_null("bytes", bytes)?;
         let section = scene.sections.get(index as usize);
@@ -241,7 +210,7 @@ pub unsafe extern "C" fn l4gs_attribute(
 ) -> L4gsStatus {
     guarded(|| {
         // SAFETY: the caller's words.
-        let scene = unsafe { open(scene) }?;
+        let scene = unsafe { caller::open("scene", scene) }?;
         refuse_null("name", name)?;
         refuse_null("width", width)?;
         refuse_null("values", values)?;
@@ -273,20 +242,12 @@ pub unsafe extern "C" fn l4gs_gaussians_gsplat(
 ) -> L4gsStatus {
     guarded(|| {
         // SAFETY: the caller's words.
-        let scene = unsafe { open(scene) }?;
+        let scene = unsafe { caller::open("scene", scene) }?;
         refuse_null("arrays", arrays)?;
-        check_count(scene, count)?;
-        // SAFETY: not null, and the caller says that it points to them.
-        let arrays = unsafe { arrays.read() };
-        let found = Gsplat::of(&scene.playable.at(time).map_err(Failure::of_call)?);
-        // SAFETY: the caller says that each has room for `count` Gaussians, and that is how many there are.
-        unsafe {
-            fill(arrays.means, &found.means);
-            fill(arrays.quats, &found.quats);
-            fill(arrays.scales, &found.scales);
-            fill(arrays.opacities, &found.opacities);
-            fill(arrays.sh, &found.sh);
-        }
+        check_count(scene.playable.len(), count)?;
+        let found = scene.playable.at(time).map_err(Failure::of_call)?;
+        // SAFETY: not null, and the caller says that it points to arrays with room for `count` Gaussians: that is how many there are.
+        unsafe { fill_gsplat(&arrays.read(), &found) };
         Ok(())
     })
 }
@@ -305,21 +266,12 @@ pub unsafe extern "C" fn l4gs_gaussians_inria(
 ) -> L4gsStatus {
     guarded(|| {
         // SAFETY: the caller's words.
-        let scene = unsafe { open(scene) }?;
+        let scene = unsafe { caller::open("scene", scene) }?;
         refuse_null("arrays", arrays)?;
-        check_count(scene, count)?;
-        // SAFETY: not null, and the caller says that it points to them.
-        let arrays = unsafe { arrays.read() };
-        let found = Inria::of(&scene.playable.at(time).map_err(Failure::of_call)?);
-        // SAFETY: the caller says that each has room for `count` Gaussians, and that is how many there are.
-        unsafe {
-            fill(arrays.means, &found.means);
-            fill(arrays.f_dc, &found.f_dc);
-            fill(arrays.f_rest, &found.f_rest);
-            fill(arrays.opacity, &found.opacity);
-            fill(arrays.scale, &found.scale);
-            fill(arrays.rot, &found.rot);
-        }
+        check_count(scene.playable.len(), count)?;
+        let found = scene.playable.at(time).map_err(Failure::of_call)?;
+        // SAFETY: not null, and the caller says that it points to arrays with room for `count` Gaussians: that is how many there are.
+        unsafe { fill_inria(&arrays.read(), &found) };
         Ok(())
     })
 }
@@ -341,85 +293,10 @@ pub unsafe extern "C" fn l4gs_render(
 ) -> L4gsStatus {
     guarded(|| {
         // SAFETY: the caller's words.
-        let scene = unsafe { open(scene) }?;
-        refuse_null("camera", camera)?;
-        refuse_null("image", image)?;
-        // SAFETY: not null, and the caller says that it points to a camera.
-        let camera = camera_of(&unsafe { camera.read() })?;
-        let background = if background.is_null() {
-            scene.playable.info().meta.background
-        } else {
-            // SAFETY: not null, and the caller says that it points to three numbers.
-            unsafe { background.cast::<[f32; 3]>().read() }
-        };
-        if !background.iter().all(|value| value.is_finite()) {
-            return Err(Failure::argument(format!("the background is {background:?}, expected three finite numbers")));
+        unsafe {
+            let playable = &caller::open("scene", scene)?.playable;
+            let image = Picture { camera, background, image, length };
+            image.draw(playable.info(), |camera, background| playable.render(camera, time, background))
         }
-        let needed = 3 * u64::from(camera.width) * u64::from(camera.height);
-        if (length as u64) < needed {
-            return Err(Failure::argument(format!("image has room for {length} floats, expected {needed}")));
-        }
-        let found = scene.playable.render(&camera, time, background).map_err(Failure::of_call)?;
-        // SAFETY: there is room for `length` numbers, and these are not more.
-        unsafe { fill(image, &found) };
-        Ok(())
     })
-}
-
-fn refuse_null<T>(name: &str, pointer: *const T) -> Result<(), Failure> {
-    if pointer.is_null() { Err(Failure::argument(format!("{name} is null"))) } else { Ok(()) }
-}
-
-fn no_such(what: &str, index: u32, count: usize) -> Failure {
-    Failure::argument(format!("{what} {index} of {count}; they are counted from 0"))
-}
-
-fn check_count(scene: &L4gsScene, count: usize) -> Result<(), Failure> {
-    let expected = scene.playable.len();
-    if count == expected {
-        return Ok(());
-    }
-    Err(Failure::argument(format!("count is {count}, expected that of the scene's Gaussians, {expected}")))
-}
-
-/// # Safety
-/// `scene` is null or open.
-unsafe fn open<'a>(scene: *const L4gsScene) -> Result<&'a L4gsScene, Failure> {
-    // SAFETY: the caller's words.
-    unsafe { scene.as_ref() }.ok_or_else(|| Failure::argument("scene is null"))
-}
-
-/// # Safety
-/// `limits` is null or points to limits.
-unsafe fn limits_of(limits: *const L4gsLimits) -> Limits {
-    // SAFETY: the caller's words.
-    unsafe { limits.as_ref() }.map_or_else(Limits::default, |limits| (*limits).into())
-}
-
-/// # Safety
-/// `to` is null or points to as many numbers as `from` has. Nobody reads or writes them meanwhile.
-unsafe fn fill(to: *mut f32, from: &[f32]) {
-    if !to.is_null() {
-        // SAFETY: the caller's words; `from` is memory of our own.
-        unsafe { std::ptr::copy_nonoverlapping(from.as_ptr(), to, from.len()) };
-    }
-}
-
-fn camera_of(camera: &L4gsCamera) -> Result<Camera, Failure> {
-    let L4gsCamera { width, height, fx, fy, cx, cy, rotation, translation } = *camera;
-    let rotation = DMat3::from_cols_array(&rotation).transpose();
-    let intrinsics = Intrinsics { width, height, fx, fy, cx, cy };
-    Camera::from_world_to_camera(rotation, DVec3::from_array(translation), &intrinsics)
-        .map_err(|error| Failure::argument(format!("camera: {error}")))
-}
-
-#[cfg(unix)]
-fn path_of(path: &CStr) -> Result<&Path, Failure> {
-    use std::os::unix::ffi::OsStrExt;
-    Ok(Path::new(std::ffi::OsStr::from_bytes(path.to_bytes())))
-}
-
-#[cfg(not(unix))]
-fn path_of(path: &CStr) -> Result<&Path, Failure> {
-    path.to_str().map(Path::new).map_err(|_| Failure::argument("path is not UTF-8"))
 }

@@ -7,7 +7,7 @@ use light4gs_codec::Limits;
 #[repr(C)]
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct L4gsLimits {
-    /// Bytes of a whole stream.
+    /// Bytes of a whole stream; a take may be longer, each stream in it may not.
     pub file_bytes: u64,
     /// Bytes of the scene meta in the header.
     pub meta_bytes: u64,
@@ -25,6 +25,8 @@ pub struct L4gsLimits {
     pub image_side: u64,
     /// Width times height of such an image.
     pub image_pixels: u64,
+    /// Segments of a take, together with the slots for further ones.
+    pub segments: u64,
     /// Gaussians.
     pub gaussians: u64,
     /// Attributes of a Gaussian.
@@ -64,8 +66,7 @@ impl From<Limits> for L4gsLimits {
             frames,
             image_side,
             image_pixels,
-            // Of takes, which C does not open.
-            segments: _,
+            segments,
             gaussians,
             attributes,
             attribute_width,
@@ -89,6 +90,7 @@ impl From<Limits> for L4gsLimits {
             frames: frames.into(),
             image_side: image_side.into(),
             image_pixels,
+            segments: segments.into(),
             gaussians: gaussians.into(),
             attributes: attributes.into(),
             attribute_width: attribute_width.into(),
@@ -118,7 +120,7 @@ impl From<L4gsLimits> for Limits {
             frames: narrow(limits.frames),
             image_side: narrow(limits.image_side),
             image_pixels: limits.image_pixels,
-            segments: Self::default().segments,
+            segments: narrow(limits.segments),
             gaussians: narrow(limits.gaussians),
             attributes: narrow(limits.attributes),
             attribute_width: narrow(limits.attribute_width),
@@ -171,6 +173,46 @@ pub struct L4gsInfo {
     pub sections: u32,
 }
 
+/// Counts and metadata of a take. What a scene has besides stands in its base.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct L4gsTakeInfo {
+    /// Seconds of the take: what the file says, or the end of the last segment where that is later.
+    pub seconds: f64,
+    /// Frames a second of the source, 0 where not known.
+    pub fps: f32,
+    /// Number of segments; see `l4gs_take_segment`.
+    pub segments: u32,
+    /// Number of extra entries; see `l4gs_take_extra`.
+    pub extras: u32,
+    /// Number of Gaussians of the base. That of a time is in `l4gs_gaussians_counts`.
+    pub gaussians: u32,
+    /// Smallest corner of the base's box, world units.
+    pub bounds_min: [f32; 3],
+    /// Largest corner.
+    pub bounds_max: [f32; 3],
+    /// Color behind the Gaussians: red, green, blue.
+    pub background: [f32; 3],
+    /// Width of the source's default camera in pixels, 0 where not known.
+    pub width: u32,
+    /// Its height.
+    pub height: u32,
+    /// Its horizontal field of view in radians, 0 where not known.
+    pub fov_x: f32,
+}
+
+/// Counts of the Gaussians of a take at one time.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct L4gsCounts {
+    /// Number of Gaussians, N.
+    pub gaussians: u32,
+    /// Degree of the spherical harmonics, 0 to 3.
+    pub sh_degree: u32,
+    /// Coefficients of a color channel, K = (degree + 1)².
+    pub sh_coefficients: u32,
+}
+
 /// An OpenCV pinhole camera: x right, y down, z forward; `x_camera = rotation · x_world + translation`. The middle of an
 /// image is at `cx = width / 2`, `cy = height / 2`.
 #[repr(C)]
@@ -194,7 +236,7 @@ pub struct L4gsCamera {
     pub translation: [f64; 3],
 }
 
-/// Arrays of the caller for `l4gs_gaussians_gsplat`, row-major; null where one is not wanted.
+/// Arrays of the caller for `l4gs_gaussians_gsplat` and `l4gs_gaussians_copy_gsplat`, row-major; null where one is not wanted.
 #[repr(C)]
 #[derive(Clone, Copy, Debug)]
 pub struct L4gsGsplatArrays {
@@ -210,7 +252,7 @@ pub struct L4gsGsplatArrays {
     pub sh: *mut f32,
 }
 
-/// Arrays of the caller for `l4gs_gaussians_inria`, row-major; null where one is not wanted.
+/// Arrays of the caller for `l4gs_gaussians_inria` and `l4gs_gaussians_copy_inria`, row-major; null where one is not wanted.
 #[repr(C)]
 #[derive(Clone, Copy, Debug)]
 pub struct L4gsInriaArrays {

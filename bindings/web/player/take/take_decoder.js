@@ -1,5 +1,7 @@
 // What the worker does with a take, besides evaluating and drawing.
 
+import { SceneError } from "../errors.js";
+
 /** @typedef {import("../scene/decoder.js").Decoder} Decoder */
 
 export class TakeDecoder {
@@ -17,9 +19,14 @@ export class TakeDecoder {
    * @param {Uint8Array[]} ranges  those that it has needed so far
    * @param {number} length  bytes of the file; a very large number where they are not known
    * @returns {{ needed: [number, number] } | { index: import("./take.js").Index | null }}  null where it is that of another file than before
+   * @throws {SceneError}
    */
   index(ranges, length) {
     const { wasm } = this.#decoder;
+    // The decoder would ask for the same range again, and so without end.
+    if (ranges.some((bytes) => bytes.length === 0)) {
+      throw new SceneError("damaged", "take: the file ends before a block of the index begins");
+    }
     wasm.begin_index();
     /** @type {{ needed: [number, number] } | null} */
     let more = null;

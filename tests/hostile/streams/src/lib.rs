@@ -13,7 +13,7 @@
 //! | `mutations.rs` | changes to them |
 //! | `bombs.rs` | streams that promise much with few bytes |
 //! | `transfers.rs` | streams that come in pieces, cut anywhere and resumed anywhere |
-//! | `takes.rs` | takes with a changed index |
+//! | `takes/` | damaged and forged takes, what a reader must say of them, and records of them for readers in other languages |
 //! | `watch.rs` | memory, time and panics of one decoding |
 
 mod bombs;

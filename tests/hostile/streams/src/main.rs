@@ -1,11 +1,13 @@
 //! Many hostile streams: `cargo run --release -p light4gs-hostile -- --inputs 1000000 --threads 2 --seed 1`. With `--what
-//! transfers`, streams that come in pieces.
+//! transfers`, streams that come in pieces; with `--what takes`, takes that were damaged or forged.
 //!
-//! Prints the findings, and saves the bytes of each.
+//! Prints the findings, and saves the bytes of each. `--what records` writes takes with our answers to the standard output, for the
+//! readers of `tests/hostile/readers`.
 
 use std::{
     collections::BTreeMap,
     fs,
+    io::Write,
     path::PathBuf,
     process::ExitCode,
     sync::{
@@ -18,6 +20,7 @@ use std::{
 
 use light4gs_hostile::{
     Inputs,
+    takes::{Takes, record},
     transfers::Transfers,
     watch::{CountingAllocator, Decoder, Outcome},
 };
@@ -25,7 +28,7 @@ use light4gs_hostile::{
 #[global_allocator]
 static ALLOCATOR: CountingAllocator = CountingAllocator;
 
-const USAGE: &str = "usage: hostile-streams [--what streams|transfers] [--inputs N] [--threads N] [--seed N] [--first N] [--out FOLDER]";
+const USAGE: &str = "usage: hostile-streams [--what streams|transfers|takes|records] [--inputs N] [--threads N] [--seed N] [--first N] [--out FOLDER]";
 /// Number of inputs between two lines of progress.
 const REPORT: u64 = 50_000;
 
@@ -70,8 +73,17 @@ impl Summary {
     }
 }
 
+/// What is made.
+#[derive(Clone, Copy)]
+enum What {
+    Streams,
+    Transfers,
+    Takes,
+    Records,
+}
+
 struct Arguments {
-    transfers: bool,
+    what: What,
     inputs: u64,
     threads: u64,
     seed: u64,
@@ -81,13 +93,21 @@ struct Arguments {
 
 fn arguments() -> Result<Arguments, String> {
     let out = "target/hostile-findings".into();
-    let mut all = Arguments { transfers: false, inputs: 10_000, threads: 1, seed: 1, first: 0, out };
+    let mut all = Arguments { what: What::Streams, inputs: 10_000, threads: 1, seed: 1, first: 0, out };
     let mut given = std::env::args().skip(1);
     while let Some(name) = given.next() {
         let value = given.next().ok_or_else(|| format!("{name} needs a value; {USAGE}"))?;
         let number = || value.parse::<u64>().map_err(|_| format!("{name} {value} is no number; {USAGE}"));
         match name.as_str() {
-            "--what" if value == "streams" || value == "transfers" => all.transfers = value == "transfers",
+            "--what" => {
+                all.what = match value.as_str() {
+                    "streams" => What::Streams,
+                    "transfers" => What::Transfers,
+                    "takes" => What::Takes,
+                    "records" => What::Records,
+                    _ => return Err(format!("--what {value} is not known; {USAGE}")),
+                }
+            }
             "--inputs" => all.inputs = number()?,
             "--threads" => all.threads = number()?.clamp(1, 64),
             "--seed" => all.seed = number()?,
@@ -100,7 +120,7 @@ fn arguments() -> Result<Arguments, String> {
 }
 
 fn main() -> ExitCode {
-    let Arguments { transfers, inputs, threads, seed, first, out } = match arguments() {
+    let Arguments { what, inputs, threads, seed, first, out } = match arguments() {
         Ok(arguments) => arguments,
         Err(problem) => {
             eprintln!("{problem}");
@@ -108,22 +128,32 @@ fn main() -> ExitCode {
         }
     };
     std::panic::set_hook(Box::new(|_| ()));
+    if let What::Records = what {
+        return write_records(seed, first..first + inputs);
+    }
     let (made, next) = (Inputs::new(seed), AtomicU64::new(first));
-    let transfers = transfers.then(|| Transfers::new(seed));
+    let transfers = matches!(what, What::Transfers).then(|| Transfers::new(seed));
+    let takes = matches!(what, What::Takes).then(|| Takes::new(seed));
     let (summary, begin) = (Mutex::new(Summary::default()), Instant::now());
     let work = || {
         let decoder = Decoder::on_this_thread();
+        let whole = takes.as_ref().map_or_else(Vec::new, |takes| takes.whole(&decoder));
         loop {
             let number = next.fetch_add(1, Ordering::Relaxed);
             if number >= first + inputs {
                 return;
             }
-            let (kind, bytes, outcome) = match &transfers {
-                Some(transfers) => {
+            let (kind, bytes, outcome) = match (&transfers, &takes) {
+                (Some(transfers), _) => {
                     let transfer = transfers.transfer(number);
                     (transfer.kind, transfer.bytes(), transfers.run(&transfer, &decoder))
                 }
-                None => {
+                (_, Some(takes)) => {
+                    let take = takes.take(number);
+                    let reading = takes.run(&take, &whole, &decoder);
+                    (take.kind, take.bytes, reading.outcome)
+                }
+                _ => {
                     let (kind, bytes) = made.input(number);
                     let outcome = decoder.run(&bytes);
                     (kind, bytes, outcome)
@@ -157,4 +187,24 @@ fn main() -> ExitCode {
     }
     summary.print(begin.elapsed().as_secs_f64());
     if summary.findings.is_empty() { ExitCode::SUCCESS } else { ExitCode::FAILURE }
+}
+
+/// Writes takes as records: first the sound ones, then those of these numbers.
+fn write_records(seed: u64, numbers: std::ops::Range<u64>) -> ExitCode {
+    let (takes, decoder) = (Takes::new(seed), Decoder::on_this_thread());
+    let whole = takes.whole(&decoder);
+    let mut output = std::io::BufWriter::new(std::io::stdout().lock());
+    let sound = (0..takes.sound_takes()).map(|index| record(index as u64, &takes.sound(index), &whole[index]));
+    let changed = numbers.map(|number| {
+        let take = takes.take(number);
+        record(number, &take, &takes.run(&take, &whole, &decoder).answers)
+    });
+    for bytes in sound.chain(changed) {
+        if let Err(error) = output.write_all(&bytes) {
+            // A reader that has seen enough ends.
+            eprintln!("cannot write a record: {error}");
+            return ExitCode::FAILURE;
+        }
+    }
+    if output.flush().is_ok() { ExitCode::SUCCESS } else { ExitCode::FAILURE }
 }

@@ -47,20 +47,24 @@ fn some_thousand_transfers_give_an_error_or_the_right_picture() {
 }
 
 #[test]
-fn some_thousand_takes_within_the_promises() {
+fn some_thousand_takes_give_an_error_or_the_right_picture() {
     let (takes, decoder) = (Takes::new(16), Decoder::on_this_thread());
-    let mut decoded = 0;
-    let mut most_bytes = 0;
+    let whole = takes.whole(&decoder);
+    let (mut shown, mut damaged, mut most_bytes) = (0, 0, 0);
     for number in 0..INPUTS {
-        let (kind, bytes) = takes.take(number);
-        let outcome = Takes::run(&bytes, &decoder);
-        let fault = outcome.fault();
-        assert!(fault.is_none(), "seed 16, take {number} ({kind}, {} bytes): {fault:?}, {outcome:?}", bytes.len());
-        decoded += u64::from(matches!(outcome.answer, Some(Ok(()))));
-        most_bytes = most_bytes.max(outcome.bytes);
+        let take = takes.take(number);
+        let reading = takes.run(&take, &whole, &decoder);
+        let (fault, length) = (reading.outcome.fault(), take.bytes.len());
+        assert!(fault.is_none(), "seed 16, take {number} ({}, {length} bytes): {fault:?}, {reading:?}", take.kind);
+        shown += u64::from(reading.shows());
+        damaged += u64::from(reading.shows() && !take.forged);
+        most_bytes = most_bytes.max(reading.outcome.bytes);
     }
-    println!("{decoded} of {INPUTS} decoded, at most {} MiB", most_bytes >> 20);
-    assert!((INPUTS / 50..INPUTS / 2).contains(&decoded), "{decoded} decoded");
+    println!("{shown} of {INPUTS} show something, {damaged} of these damaged, at most {} MiB", most_bytes >> 20);
+    assert!(
+        (INPUTS / 10..INPUTS).contains(&shown) && damaged > INPUTS / 20,
+        "{shown} show something, {damaged} damaged"
+    );
 }
 
 /// As many segments as the limits allow: SECURITY.md says in which memory their index is read.
