@@ -13,6 +13,8 @@ const INCLUDES: &str = "// #include ";
 
 fn main() -> Result<(), Box<dyn Error>> {
     println!("cargo::rerun-if-changed=.");
+    // The generated file names this folder, and another work tree may share the target folder.
+    println!("cargo::rerun-if-env-changed=CARGO_MANIFEST_DIR");
     let root = PathBuf::from(env::var("CARGO_MANIFEST_DIR")?);
     let (shared, kernels): (Vec<PathBuf>, Vec<PathBuf>) =
         files(&root)?.into_iter().partition(|file| SHARED.contains(&folder(file)));

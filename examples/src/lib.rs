@@ -31,7 +31,7 @@ pub fn tiny_scene(folder: &Path) -> Result<PathBuf, DataError> {
 /// # Errors
 /// None in practice: the preset is part of the library, and the tests read it.
 pub fn tiny_config() -> Outcome<Config> {
-    let mut config = Config::from_preset("dnerf-cpu")?;
+    let mut config = Config::from_preset("hexplane-dnerf-cpu")?;
     config.device = DeviceName::Flex;
     config.data.initial_points = 400;
     config.model.sh_degree = 1;

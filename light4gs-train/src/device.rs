@@ -5,29 +5,54 @@
 
 use burn::tensor::Device;
 
-use crate::config::{DEVICES, DeviceName, UnknownDevice};
+use crate::config::{Adapter, DEVICES, DeviceName, UnknownDevice};
 use crate::error::TrainError;
 
 /// The back ends that this build contains, by name: those of [`DEVICES`] whose Cargo feature is on.
 pub fn built_in() -> Vec<&'static str> {
-    let features =
-        [("ndarray", cfg!(feature = "ndarray")), ("flex", cfg!(feature = "flex")), ("wgpu", cfg!(feature = "wgpu"))];
+    let features = [
+        ("auto", true),
+        ("ndarray", cfg!(feature = "ndarray")),
+        ("flex", cfg!(feature = "flex")),
+        ("wgpu", cfg!(feature = "wgpu")),
+    ];
     let is_built_in = |name: &&str| features.contains(&(*name, true));
     DEVICES.iter().copied().filter(is_built_in).collect()
 }
 
-/// A device for work that gives the same result on every back end: `flex` if this build contains it, else the first
-/// back end that it contains.
+/// A device for work that gives the same result on every back end: the processor, if this build computes there.
 ///
 /// # Errors
-/// [`TrainError::Input`] if this build contains none.
+/// [`TrainError::Input`] if this build has no back end.
 pub fn any() -> Result<Device, TrainError> {
-    let names = built_in();
-    let name = names.iter().find(|name| **name == "flex").or(names.first());
-    device_by_name(name.ok_or_else(|| TrainError::Input("this program was built without a back end".into()))?)
+    open(processor())
 }
 
-/// The device with a name, without autodiff: `ndarray`, `flex`, `wgpu` (the strongest adapter), `wgpu:0` (by number),
+/// The back end that a name means on this machine: `auto` is a graphics card, a discrete one first, and the processor where there is
+/// none. A driver in software is no card.
+pub fn chosen(name: DeviceName) -> DeviceName {
+    if name != DeviceName::Auto {
+        return name;
+    }
+    #[cfg(feature = "wgpu")]
+    for card in [Adapter::Discrete, Adapter::Integrated].map(DeviceName::Wgpu) {
+        if open(card).is_ok() {
+            return card;
+        }
+    }
+    processor()
+}
+
+/// The back end of this build that is fastest on a processor; without one, that for graphics cards.
+fn processor() -> DeviceName {
+    match (cfg!(feature = "flex"), cfg!(feature = "ndarray")) {
+        (true, _) => DeviceName::Flex,
+        (false, true) => DeviceName::NdArray,
+        (false, false) => DeviceName::Wgpu(Adapter::Strongest),
+    }
+}
+
+/// The device with a name, without autodiff: `auto`, `ndarray`, `flex`, `wgpu` (the strongest adapter), `wgpu:0` (by number),
 /// `wgpu:discrete`, `wgpu:integrated`, `wgpu:cpu` (a software driver).
 ///
 /// # Errors
@@ -42,6 +67,7 @@ pub fn device_by_name(name: &str) -> Result<Device, TrainError> {
 /// [`TrainError::Input`] where this build does not contain the back end, or this machine has no such adapter.
 pub fn open(name: DeviceName) -> Result<Device, TrainError> {
     match name {
+        DeviceName::Auto => open(chosen(name)),
         #[cfg(feature = "ndarray")]
         DeviceName::NdArray => Ok(Device::ndarray()),
         #[cfg(feature = "flex")]
@@ -134,7 +160,7 @@ pub fn computes_on_processor(device: &Device) -> bool {
 
 /// The name that a wgpu device's adapter reports; `None` for the CPU back ends.
 pub fn adapter_name(name: DeviceName, device: &Device) -> Option<String> {
-    match name {
+    match chosen(name) {
         #[cfg(feature = "wgpu")]
         DeviceName::Wgpu(_) => device.clone().inner().identity().map(|identity| identity.name),
         _ => {
@@ -146,6 +172,7 @@ pub fn adapter_name(name: DeviceName, device: &Device) -> Option<String> {
 
 /// The text for a device in reports: its name, and for wgpu the adapter's, as in `wgpu (llvmpipe)`.
 pub fn describe(name: DeviceName, device: &Device) -> String {
+    let name = chosen(name);
     match adapter_name(name, device) {
         Some(adapter) => format!("{name} ({adapter})"),
         None => name.to_string(),
@@ -155,8 +182,6 @@ pub fn describe(name: DeviceName, device: &Device) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
-    #[cfg(feature = "wgpu")]
-    use crate::config::Adapter;
 
     #[test]
     fn unknown_names_are_wrong_input() {
@@ -173,6 +198,14 @@ mod tests {
                 Err(error) => assert!(error.to_string().contains(name), "{error}"),
             }
         }
+    }
+
+    #[test]
+    fn auto_is_a_card_or_the_processor() {
+        let name = chosen(DeviceName::Auto);
+        assert!(name != DeviceName::Auto && open(name).is_ok(), "{name}");
+        assert_eq!(chosen(DeviceName::NdArray), DeviceName::NdArray);
+        assert!(open(DeviceName::Auto).is_ok());
     }
 
     #[cfg(feature = "wgpu")]

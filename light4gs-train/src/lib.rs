@@ -41,7 +41,7 @@
 //! let synthetic = SyntheticOptions { resolution: 32, train_frames: 4, test_frames: 1, val_frames: 0, seed: 0 };
 //! write_synthetic(&root, &synthetic)?;
 //!
-//! let mut config = Config::from_preset("dnerf-cpu")?;
+//! let mut config = Config::from_preset("hexplane-dnerf-cpu")?;
 //! config.device = DeviceName::Flex;
 //! config.train.coarse_iterations = 1;
 //! config.train.fine_iterations = 2;
@@ -78,6 +78,7 @@ pub mod metrics;
 pub mod observers;
 pub mod optimization;
 pub mod pace;
+pub mod provenance;
 mod randomness;
 pub mod regularizer;
 pub mod run;

@@ -29,7 +29,7 @@
 //! use light4gs::train::config::Config;
 //! use light4gs::train::device;
 //!
-//! let config = Config::from_preset("dnerf-cpu")?;
+//! let config = Config::from_preset("dnerf")?;
 //! let positions = vec![[0.0; 3], [0.5, 0.0, 0.2], [0.1, 0.4, 0.1], [0.3, 0.2, -0.3]];
 //! let cloud = PointCloud { positions, colors: vec![[0.8, 0.4, 0.1]; 4] };
 //! let scene = config.model.build().init(&cloud, &device::any()?);

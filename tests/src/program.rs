@@ -95,7 +95,7 @@ impl Workspace {
 
     /// `train scene --out RUN`, which takes seconds, with more `--set`.
     pub fn train(&self, run: &str, overrides: &[&str]) -> Command {
-        let mut command = self.command(["train", "scene", "--quiet", "--config", "dnerf-cpu", "--out", run]);
+        let mut command = self.command(["train", "scene", "--quiet", "--config", "hexplane-dnerf-cpu", "--out", run]);
         for key_value in TINY.iter().chain(overrides) {
             command.args(["--set", key_value]);
         }

@@ -50,16 +50,30 @@ pub(crate) struct Drawn<'a> {
     /// [`FLOATS`] numbers for each Gaussian.
     pub(crate) packed: &'a [f32],
     pub(crate) gaussians: &'a GaussianArrays,
-    /// Whether a Gaussian of the stream is not drawn; what the list does not have is drawn.
-    pub(crate) hidden: &'a [bool],
+    /// Who draws them: a list of the Gaussians of the stream that are hidden, and a weight. The weight of a Gaussian is the sum of
+    /// those that do not hide it; what a list does not have is not hidden.
+    pub(crate) shares: &'a [Share<'a>],
     /// Which Gaussians of the stream they are; empty where they are all.
     pub(crate) indices: &'a [u32],
 }
 
+/// Hidden Gaussians, and a weight.
+pub(crate) type Share<'a> = (&'a [bool], f32);
+
+/// All are drawn as they are.
+pub(crate) const WHOLE: &[Share<'_>] = &[(&[], 1.0)];
+
+/// The weights of a moment have the sum 1, but for rounding.
+const NEARLY_ONE: f32 = 1.0 - 1e-5;
+
 impl Drawn<'_> {
-    fn is_hidden(&self, index: usize) -> bool {
+    /// The opacity with which a Gaussian is drawn: `1 - (1 - o)^weight`.
+    fn opacity(&self, index: usize) -> f32 {
         let of_stream = self.indices.get(index).map_or(index, |&index| index as usize);
-        self.hidden.get(of_stream).copied().unwrap_or(false)
+        let is_shown = |hidden: &[bool]| !hidden.get(of_stream).copied().unwrap_or(false);
+        let weight: f32 = self.shares.iter().filter(|(hidden, _)| is_shown(hidden)).map(|(_, weight)| weight).sum();
+        let opacity = self.packed[FLOATS * index + 3];
+        if weight >= NEARLY_ONE { opacity } else { 1.0 - (1.0 - opacity).powf(weight) }
     }
 }
 
@@ -81,8 +95,8 @@ impl DrawList {
         for part in parts {
             for (index, gaussian) in part.packed.chunks_exact(FLOATS).enumerate() {
                 let depth = viewpoint.depth([gaussian[0], gaussian[1], gaussian[2]]);
-                let seen = depth > NEAR && gaussian[3] >= MIN_ALPHA && (all || viewpoint.sees(gaussian, depth));
-                if seen && !part.is_hidden(index) {
+                let near = depth > NEAR && gaussian[3] >= MIN_ALPHA && (all || viewpoint.sees(gaussian, depth));
+                if near && part.opacity(index) >= MIN_ALPHA {
                     // Depths are positive, so their bits sort as they do.
                     self.keys.push((depth.to_bits(), begin + index as u32));
                 }
@@ -97,7 +111,9 @@ impl DrawList {
             let gaussian = &part.packed[FLOATS * index..][..FLOATS];
             let color = seen_color(part.gaussians, index, std::array::from_fn(|axis| gaussian[axis] - eye[axis]));
             if color.iter().all(|value| value.is_finite()) {
-                self.entries.extend_from_slice(gaussian);
+                self.entries.extend_from_slice(&gaussian[..3]);
+                self.entries.push(part.opacity(index));
+                self.entries.extend_from_slice(&gaussian[4..]);
                 self.entries.extend_from_slice(&color);
                 self.entries.extend_from_slice(&[0.0; ENTRY - FLOATS - 3]);
             }
@@ -190,7 +206,7 @@ mod tests {
     }
 
     fn drawn((packed, gaussians): &(Vec<f32>, GaussianArrays)) -> Drawn<'_> {
-        Drawn { packed, gaussians, hidden: &[], indices: &[] }
+        Drawn { packed, gaussians, shares: WHOLE, indices: &[] }
     }
 
     fn order(list: &mut DrawList, scene: &(Vec<f32>, GaussianArrays), z: f32) -> Vec<usize> {
@@ -222,10 +238,23 @@ mod tests {
         };
         let [base, segment] = [&first, &second].map(drawn);
         assert_eq!(depths(&[base, segment]), [5.0, 4.0, 3.0, 2.0, 1.0]);
-        let hidden = [false, true];
-        assert_eq!(depths(&[Drawn { hidden: &hidden, ..base }, segment]), [5.0, 4.0, 2.0, 1.0]);
+        let hidden: [Share<'_>; 1] = [(&[false, true], 1.0)];
+        assert_eq!(depths(&[Drawn { shares: &hidden, ..base }, segment]), [5.0, 4.0, 2.0, 1.0]);
         // A level of detail has some of the Gaussians: here the stream's numbers 1, 4 and 0.
-        assert_eq!(depths(&[Drawn { hidden: &hidden, indices: &[1, 4, 0], ..base }, segment]), [4.0, 3.0, 2.0, 1.0]);
+        assert_eq!(depths(&[Drawn { shares: &hidden, indices: &[1, 4, 0], ..base }, segment]), [4.0, 3.0, 2.0, 1.0]);
+    }
+
+    #[test]
+    fn around_a_join_opacities_are_shared() {
+        let mut scene = along_z(&[1.0, 2.0, 3.0, 4.0]);
+        scene.0.chunks_exact_mut(FLOATS).for_each(|gaussian| gaussian[3] = 0.75);
+        // Nobody hides the first, one of them the second or the third, both the last.
+        let shares: [Share<'_>; 2] = [(&[false, true, false, true], 0.5), (&[false, false, true, true], 0.5)];
+        let viewpoint = Viewpoint { row: [0.0, 0.0, 1.0, 0.0], eye: [0.0; 3], spread: f32::INFINITY };
+        let mut list = DrawList::default();
+        let entries = list.make(&[Drawn { shares: &shares, ..drawn(&scene) }], &viewpoint);
+        let opacities: Vec<f32> = entries.chunks_exact(ENTRY).map(|entry| entry[3]).filter(|&one| one > 0.0).collect();
+        assert_eq!(opacities, [0.5, 0.5, 0.75]);
     }
 
     #[test]

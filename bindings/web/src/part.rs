@@ -2,7 +2,7 @@
 
 use light4gs_codec::{CodecError, GaussianArrays, MotionEvaluator, SceneData};
 
-use crate::draw_list::Drawn;
+use crate::draw_list::{Drawn, Share};
 use crate::gaussians::{FLOATS, Unchanged, pack};
 use crate::levels::{Selection, levels, most_significance, select};
 
@@ -105,10 +105,10 @@ impl Part {
         pack(moved, unchanged, &selection.growth, range, packed);
     }
 
-    /// The Gaussians as computed last, without those that are hidden: a bit for each Gaussian of the stream, or none.
-    pub(crate) fn drawn<'a>(&'a self, hidden: &'a [bool]) -> Drawn<'a> {
+    /// The Gaussians as computed last, and who draws them: [`Drawn::shares`].
+    pub(crate) fn drawn<'a>(&'a self, shares: &'a [Share<'a>]) -> Drawn<'a> {
         let Level { moved, selection, packed, .. } = self.shown();
-        Drawn { packed, gaussians: moved, hidden, indices: &selection.indices }
+        Drawn { packed, gaussians: moved, shares, indices: &selection.indices }
     }
 
     /// All Gaussians at a time.

@@ -3,7 +3,7 @@
 use light4gs_codec::{CodecError, SceneData};
 
 use crate::description::{Facts, describe};
-use crate::draw_list::{DrawList, Viewpoint};
+use crate::draw_list::{DrawList, Viewpoint, WHOLE};
 use crate::gaussians::activated;
 use crate::levels::levels;
 use crate::part::Part;
@@ -52,7 +52,7 @@ impl OpenScene {
 
     /// The Gaussians as computed last, back to front, [`ENTRY`](crate::ENTRY) numbers each.
     pub fn draw_list(&mut self, viewpoint: &Viewpoint) -> &[f32] {
-        self.list.make(&[self.part.drawn(&[])], viewpoint)
+        self.list.make(&[self.part.drawn(WHOLE)], viewpoint)
     }
 
     /// All attributes at a time, activated: centers `[N, 3]`, standard deviations `[N, 3]`, unit quaternions `(w, x, y, z)

@@ -16,6 +16,7 @@
 //! | draw a plot as SVG and PNG | [`study::plots`] |
 //! | time the parts of a training step on a device | [`benchmark::benchmark`](benchmark::benchmark()), on a [`BenchScene`](benchmark::BenchScene) |
 //! | time the entropy coders | [`codec_benchmark`](benchmark::codec::codec_benchmark) |
+//! | write figures down with where they come from | [`Record`](record::Record), [`study::rows`] |
 //!
 //! **In short:** the commands of the program suffice for most studies; docs/studies.md describes their files.
 //!
@@ -45,4 +46,5 @@
 //! ```
 
 pub mod benchmark;
+pub mod record;
 pub mod study;

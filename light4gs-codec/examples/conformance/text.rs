@@ -3,7 +3,7 @@
 
 use light4gs_codec::{
     CodecError, CoordinateMapping, GaussianArrays, Limits, MotionEvaluator, SceneData, decode, info,
-    take::{SegmentTimes, Take, TakeSegment, drawn_together, is_take},
+    take::{DrawnSegment, SegmentPart, SegmentTimes, Take, TakeSegment, drawn_together, is_take},
 };
 
 /// The lines of a stream or a take. Times are numbers as text; they stand in the lines as they are given. Those of a take are
@@ -50,14 +50,14 @@ fn take_lines(bytes: &[u8], times: &[&str]) -> Result<Vec<String>, CodecError> {
     }
     for time in times {
         let seconds = time.parse().expect("a time is a number");
-        let drawn = match take.segment_at(seconds) {
-            None => drawn_together(&base.gaussians, &[], None),
-            Some(number) => {
-                let (times, scene, evaluator, hidden) = &segments[number];
-                let moved = moved(scene, evaluator, times.stream_time(seconds));
-                drawn_together(&base.gaussians, hidden, Some(&moved))
-            }
-        };
+        let parts = take.drawn_at(seconds).into_iter().map(|DrawnSegment { segment, weight }| {
+            let (times, scene, evaluator, hidden) = &segments[segment];
+            (hidden, moved(scene, evaluator, times.stream_time(seconds)), weight)
+        });
+        let parts: Vec<_> = parts.collect();
+        let parts: Vec<_> =
+            parts.iter().map(|(hidden, moved, weight)| SegmentPart { hidden, moved, weight: *weight }).collect();
+        let drawn = drawn_together(&base.gaussians, &parts);
         frame(time, &drawn, &mut lines);
     }
     Ok(lines)

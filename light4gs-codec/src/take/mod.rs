@@ -38,10 +38,12 @@
 //! | `hidden.rs` | which Gaussians of the base are not drawn |
 //! | `new_segment.rs`, `write.rs`, `append.rs`, `take_file.rs` | writing and appending |
 //! | `open.rs` | reading a take, segment by segment |
-//! | `together.rs` | the Gaussians of base and segment |
+//! | `fade.rs` | which segments are drawn at a time: two around a join |
+//! | `together.rs` | the Gaussians of base and segments |
 
 #[cfg_attr(target_os = "unknown", allow(dead_code))] // Files are appended to, and a browser has none.
 mod append;
+mod fade;
 mod hidden;
 mod index;
 mod index_reader;
@@ -58,6 +60,7 @@ mod times;
 mod together;
 mod write;
 
+pub use fade::DrawnSegment;
 pub use index::{SegmentPlace, TakeIndex};
 pub use index_reader::IndexReader;
 pub use meta::TakeMeta;
@@ -66,7 +69,7 @@ pub use open::{Take, TakeSegment};
 #[cfg(not(target_os = "unknown"))]
 pub use take_file::TakeFile;
 pub use times::SegmentTimes;
-pub use together::drawn_together;
+pub use together::{SegmentPart, drawn_together};
 pub use write::write_take;
 
 use crate::format::TAKE_MAGIC;

@@ -10,7 +10,7 @@ use std::{
 
 #[cfg(not(target_os = "unknown"))]
 use super::index::of_base;
-use super::{IndexReader, SegmentTimes, TakeIndex, TakeMeta};
+use super::{DrawnSegment, IndexReader, SegmentTimes, TakeIndex, TakeMeta};
 use crate::{CodecError, Limits};
 #[cfg(not(target_os = "unknown"))]
 use crate::{
@@ -102,6 +102,11 @@ impl Take {
     /// The segment that is shown at a time in seconds. See [`TakeIndex::segment_at`].
     pub fn segment_at(&self, seconds: f64) -> Option<usize> {
         self.index.segment_at(seconds)
+    }
+
+    /// The segments that are drawn at a time in seconds. See [`TakeIndex::drawn_at`].
+    pub fn drawn_at(&self, seconds: f64) -> Vec<DrawnSegment> {
+        self.index.drawn_at(seconds)
     }
 
     /// The stream of the base. Its own checksums are checked when it is decoded; then [`TakeIndex::check_base`] says whether it

@@ -1,21 +1,47 @@
-//! The Gaussians that a take shows: those of the base and those of a segment.
+//! The Gaussians that a take shows: those of the base and those of its segments.
 
+use super::fade::faded;
 use crate::{GaussianArrays, sh_rest_coefficients};
 
-/// The Gaussians of the base that are not hidden, and then those of the segment, both in their order.
+/// What a segment shows at a time.
+#[derive(Clone, Copy, Debug)]
+pub struct SegmentPart<'a> {
+    /// For each Gaussian of the base, whether the segment hides it; what the list does not have is drawn.
+    pub hidden: &'a [bool],
+    /// The segment's own Gaussians, at the time.
+    pub moved: &'a GaussianArrays,
+    /// Its share, as of [`DrawnSegment::weight`](super::DrawnSegment::weight).
+    pub weight: f32,
+}
+
+/// The Gaussians of the base that not all segments hide, and then those of each segment, all in their order.
 ///
-/// The spherical harmonics have the larger of the two degrees; those that one of them has not are 0. Further attributes are left
-/// out, as base and segment need not have the same. `hidden` has a bit for each Gaussian of the base; what it does not have is
-/// drawn.
-pub fn drawn_together(base: &GaussianArrays, hidden: &[bool], segment: Option<&GaussianArrays>) -> GaussianArrays {
-    let is_hidden = |index: u32| hidden.get(index as usize).copied().unwrap_or(false);
-    let base = GaussianArrays { further: Vec::new(), ..base.clone() };
-    let visible: Vec<u32> = (0..base.len() as u32).filter(|&index| !is_hidden(index)).collect();
-    let mut drawn = if visible.len() == base.len() { base } else { base.gathered(&visible) };
-    if let Some(segment) = segment {
-        let degree = drawn.sh_degree.max(segment.sh_degree);
-        drawn = of_degree(drawn, degree);
-        drawn.append(of_degree(GaussianArrays { further: Vec::new(), ..segment.clone() }, degree));
+/// With a weight `w` that is not 1, an opacity `o` becomes `1 - (1 - o)^w`. A Gaussian of the base that one of two segments
+/// hides has the weight of the other one. The spherical harmonics have the largest of the degrees; those that a part has not are
+/// 0. Further attributes are left out, as the parts need not have the same.
+pub fn drawn_together(base: &GaussianArrays, segments: &[SegmentPart<'_>]) -> GaussianArrays {
+    let shown = |part: &SegmentPart<'_>, index: usize| !part.hidden.get(index).copied().unwrap_or(false);
+    let mut drawn = GaussianArrays { further: Vec::new(), ..base.clone() };
+    if segments.iter().any(|part| !part.hidden.is_empty()) {
+        let mut visible = Vec::new();
+        for (index, logit) in drawn.opacity_logits.iter_mut().enumerate() {
+            let mut weights = segments.iter().filter(|part| shown(part, index)).map(|part| part.weight);
+            match (weights.next(), weights.next()) {
+                (None, _) => continue,
+                (Some(weight), None) => *logit = faded(*logit, weight),
+                // Shown by all: there are at most two.
+                (Some(_), Some(_)) => {}
+            }
+            visible.push(index as u32);
+        }
+        drawn = drawn.gathered(&visible);
+    }
+    let degree = segments.iter().map(|part| part.moved.sh_degree).fold(drawn.sh_degree, u8::max);
+    drawn = of_degree(drawn, degree);
+    for part in segments {
+        let mut moved = of_degree(GaussianArrays { further: Vec::new(), ..part.moved.clone() }, degree);
+        moved.opacity_logits.iter_mut().for_each(|logit| *logit = faded(*logit, part.weight));
+        drawn.append(moved);
     }
     drawn
 }

@@ -98,7 +98,8 @@ mod tests {
     use super::*;
 
     fn config(overrides: &[&str]) -> Config {
-        Config::load("dnerf-cpu", &overrides.iter().map(|text| (*text).to_owned()).collect::<Vec<_>>()).unwrap()
+        Config::load("hexplane-dnerf-cpu", &overrides.iter().map(|text| (*text).to_owned()).collect::<Vec<_>>())
+            .unwrap()
     }
 
     #[test]

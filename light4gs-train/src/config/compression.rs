@@ -133,7 +133,7 @@ keys! {
         #[serde(flatten)]
         initial: AdaptiveQuantizationConfig;
         /// The steps are learned. They become coarser than at the start where that pays, but never finer: finer steps help
-        /// training frames only ([results](results/hexplane.md#learned-quantization-steps)).
+        /// training frames only ([results](notebook/2026-11-23-hexplane.md#learned-quantization-steps)).
         adaptive: bool = true; Flag, "paper; dropped by the reference";
         /// Iteration of the fine stage from which the steps are learned.
         adaptive_from: usize = 15_000; ITERATION, "paper";

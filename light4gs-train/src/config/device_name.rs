@@ -1,4 +1,4 @@
-//! Names of back ends: `ndarray`, `flex`, `wgpu`, `wgpu:0`, `wgpu:discrete`.
+//! Names of back ends: `auto`, `ndarray`, `flex`, `wgpu`, `wgpu:0`, `wgpu:discrete`.
 
 use std::fmt;
 use std::str::FromStr;
@@ -7,17 +7,18 @@ use light4gs_keys::{KeyValue, nearest};
 use serde::{Deserialize, Deserializer, Serialize, Serializer};
 
 /// The back ends by name; `wgpu` may be followed by an adapter, as in `wgpu:0` or `wgpu:cpu`.
-pub const DEVICES: &[&str] = &["ndarray", "flex", "wgpu"];
+pub const DEVICES: &[&str] = &["auto", "ndarray", "flex", "wgpu"];
 
 /// A back end, and for `wgpu` its adapter. That a name can be parsed does not mean that this build contains the back
 /// end, nor that this machine has the adapter: [`crate::device::open`] tells.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Default)]
 pub enum DeviceName {
+    /// `wgpu` where there is a graphics card, otherwise the processor: [`crate::device::chosen`] decides.
+    #[default]
+    Auto,
     /// Burn's `ndarray` back end, on the processor.
-    #[cfg_attr(not(feature = "flex"), default)]
     NdArray,
     /// Burn's `flex` back end, on the processor: the faster one.
-    #[cfg_attr(feature = "flex", default)]
     Flex,
     /// Burn's `wgpu` back end, on a graphics adapter.
     Wgpu(Adapter),
@@ -43,15 +44,11 @@ impl DeviceName {
     /// The name without the adapter, one of [`DEVICES`].
     pub fn back_end(self) -> &'static str {
         match self {
+            Self::Auto => "auto",
             Self::NdArray => "ndarray",
             Self::Flex => "flex",
             Self::Wgpu(_) => "wgpu",
         }
-    }
-
-    /// Whether it computes on the processor, on which the caller runs too.
-    pub fn computes_on_processor(self) -> bool {
-        matches!(self, Self::NdArray | Self::Flex)
     }
 }
 
@@ -59,7 +56,7 @@ impl fmt::Display for DeviceName {
     fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
         formatter.write_str(self.back_end())?;
         match self {
-            Self::NdArray | Self::Flex | Self::Wgpu(Adapter::Strongest) => Ok(()),
+            Self::Auto | Self::NdArray | Self::Flex | Self::Wgpu(Adapter::Strongest) => Ok(()),
             Self::Wgpu(Adapter::Discrete) => formatter.write_str(":discrete"),
             Self::Wgpu(Adapter::Integrated) => formatter.write_str(":integrated"),
             Self::Wgpu(Adapter::Software) => formatter.write_str(":cpu"),
@@ -87,11 +84,12 @@ impl FromStr for DeviceName {
 
     fn from_str(name: &str) -> Result<Self, UnknownDevice> {
         let unknown = || {
-            let known = ["ndarray", "flex", "wgpu", "wgpu:0", "wgpu:discrete", "wgpu:integrated", "wgpu:cpu"];
+            let known = ["auto", "ndarray", "flex", "wgpu", "wgpu:0", "wgpu:discrete", "wgpu:integrated", "wgpu:cpu"];
             let nearest = nearest(known, name);
             UnknownDevice { name: name.to_owned(), nearest: nearest.expect("some names are known") }
         };
         match name {
+            "auto" => Ok(Self::Auto),
             "ndarray" => Ok(Self::NdArray),
             "flex" => Ok(Self::Flex),
             "wgpu" => Ok(Self::Wgpu(Adapter::Strongest)),
@@ -126,7 +124,9 @@ mod tests {
 
     #[test]
     fn names_are_read_and_written() {
-        for name in ["ndarray", "flex", "wgpu", "wgpu:0", "wgpu:12", "wgpu:discrete", "wgpu:integrated", "wgpu:cpu"] {
+        for name in
+            ["auto", "ndarray", "flex", "wgpu", "wgpu:0", "wgpu:12", "wgpu:discrete", "wgpu:integrated", "wgpu:cpu"]
+        {
             assert_eq!(name.parse::<DeviceName>().map(|device| device.to_string()).as_deref(), Ok(name));
         }
         for name in ["", "cuda", "wgpu:", "wgpu:-1", "wgpu:fast", "flex:0", "Wgpu"] {

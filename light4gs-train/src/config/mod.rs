@@ -6,7 +6,7 @@
 //! the full key path. `docs/configuration.md` lists every key.
 //!
 //! ```toml
-//! extends = "dnerf-cpu"      # a built-in preset, or a path relative to this file
+//! extends = "hexplane-dnerf-cpu"      # a built-in preset, or a path relative to this file
 //!
 //! [train]
 //! fine_iterations = 2000
@@ -59,7 +59,7 @@ keys! {
     pub struct Config {
         /// Seed of everything random in a run: scattering, splitting, the order of frames.
         seed: u64 = 0; Whole { least: 0, most: MOST_INTEGER }, "ours";
-        /// Back end that computes: `ndarray`, `flex`, or `wgpu`, the last with an adapter if wanted: `wgpu:0` (by
+        /// Back end that computes: `auto` (a graphics card where there is one, otherwise the processor), `ndarray`, `flex`, or `wgpu`, the last with an adapter if wanted: `wgpu:0` (by
         /// number), `wgpu:discrete`, `wgpu:integrated`, `wgpu:cpu` (software driver).
         device: DeviceName = DeviceName::default();
             Parsed { names: DEVICES, also: "wgpu also with an adapter" }, "ours";
@@ -117,7 +117,7 @@ impl Config {
     /// [`Overrides::parse`] takes them, such as `train.fine_iterations=200`.
     ///
     /// A name without a folder and without `.toml` is a preset, unless only a file has that name. More presets or files
-    /// may follow, each after a `+`, as in `dnerf-lego-cpu+medium`: they are laid on top in that order. The path of a
+    /// may follow, each after a `+`, as in `hexplane-dnerf-lego-cpu+medium`: they are laid on top in that order. The path of a
     /// file that exists may itself have a `+` in it.
     ///
     /// # Errors

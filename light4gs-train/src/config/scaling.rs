@@ -140,7 +140,7 @@ mod tests {
 
     #[test]
     fn a_schedule_of_the_same_length_changes_nothing() {
-        for preset in ["hypernerf-cpu", "nerfds-cpu", "dnerf-lego-cpu+nodes+medium", "dnerf", "quickstart"] {
+        for preset in ["hypernerf", "nerfds", "dnerf+medium", "hexplane-dnerf", "quickstart"] {
             let config = Config::load(preset, &[]).unwrap();
             assert_eq!(config.for_schedule(1.0, &Overrides::default()), config, "{preset}");
         }
@@ -162,7 +162,7 @@ mod tests {
 
     #[test]
     fn gaussians_follow_the_images() {
-        let config = Config::load("hypernerf-cpu", &["data.resolution=200".into()]).unwrap();
+        let config = Config::load("hypernerf", &["data.resolution=200".into()]).unwrap();
         let most = |pixels, longest| {
             let config = config.for_pixels(pixels, longest);
             config.validate().unwrap();
@@ -178,7 +178,7 @@ mod tests {
     /// At the hull's bytes, its values; with fewer bytes fewer Gaussians and a dearer byte, within bounds.
     #[test]
     fn fewer_bytes_are_fewer_gaussians_and_a_dearer_byte() {
-        let config = Config::load("dnerf-cpu+nodes", &[]).unwrap();
+        let config = Config::load("dnerf", &[]).unwrap();
         let at = |bytes| {
             let config = config.for_target_bytes(bytes, &Overrides::default());
             config.validate().unwrap();
@@ -195,7 +195,7 @@ mod tests {
 
     #[test]
     fn what_is_set_by_hand_wins() {
-        let preset = Config::load("hypernerf-cpu", &[]).unwrap();
+        let preset = Config::load("hypernerf", &[]).unwrap();
         let by_hand = ["train.fine_iterations=10000", "train = { densify = { adaptive = { max_gaussians = 70 } } }"];
         let by_hand = Overrides::parse(&by_hand.map(str::to_owned)).unwrap();
         let changed = preset.for_pixels(960, 960).with(&by_hand).unwrap().for_schedule(2.0, &by_hand);
@@ -208,7 +208,7 @@ mod tests {
     /// The keys' names are those of the values, and a wish leaves each alone that is set by hand.
     #[test]
     fn every_key_that_a_wish_changes_can_be_set_by_hand() {
-        let presets = "hypernerf-cpu+nodes+medium";
+        let presets = "hypernerf+medium";
         let free = Overrides::default();
         let wished = |config: &Config, by_hand: &Overrides| {
             let config = config.for_target_bytes(20_000, by_hand).for_schedule(3.0, by_hand);

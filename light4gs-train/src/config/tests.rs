@@ -48,7 +48,7 @@ fn a_layout_without_a_preset_is_named() {
         }
     }
     let text = Config::preset_of(&Own).unwrap_err().to_string();
-    assert!(text.contains("layout `own`") && text.contains("dnerf-cpu"), "{text}");
+    assert!(text.contains("layout `own`") && text.contains("dnerf"), "{text}");
 }
 
 /// Set, the test of what follows from the declarations of keys writes it instead of comparing it.
@@ -222,9 +222,9 @@ fn extends_in_a_circle_is_refused() {
 
 #[test]
 fn tables_merge_deeply_and_the_top_wins() {
-    let folder = folder_with("mine.toml", "extends = \"dnerf-cpu\"\n[model.hexplane]\nmultipliers = [1]\n");
+    let folder = folder_with("mine.toml", "extends = \"hexplane-dnerf-cpu\"\n[model.hexplane]\nmultipliers = [1]\n");
     let mine = Config::from_file(folder.path().join("mine.toml")).expect("a configuration");
-    let small = Config::from_preset("dnerf-cpu").expect("a preset");
+    let small = Config::from_preset("hexplane-dnerf-cpu").expect("a preset");
     assert_eq!(mine.model.fields.hexplane.hexplane.multipliers, [1]);
     assert_eq!(mine.model.fields.hexplane.hexplane.channels, small.model.fields.hexplane.hexplane.channels);
     assert_eq!(mine.train, small.train);
@@ -236,13 +236,13 @@ fn a_path_may_have_the_sign_that_joins_names() {
     let folder = tempfile::tempdir().expect("a temporary folder");
     let run = folder.path().join("preset+quarter");
     fs::create_dir(&run).expect("making a folder");
-    fs::write(run.join("a+b.toml"), "extends = \"dnerf-cpu\"\nseed = 7\n").expect("writing a file");
+    fs::write(run.join("a+b.toml"), "extends = \"hexplane-dnerf-cpu\"\nseed = 7\n").expect("writing a file");
     fs::write(run.join("pixels.toml"), "[data]\nresolution = 64\n").expect("writing a file");
     let [base, pixels] = ["a+b.toml", "pixels.toml"].map(|name| run.join(name).display().to_string());
     let config = Config::load(&base, &[]).expect("a configuration");
     assert_eq!(config.seed, 7);
     let config = Config::load(&format!("{base}+medium+{pixels}"), &[]).expect("a configuration");
-    let expected = Config::load("dnerf-cpu+medium", &["seed=7", "data.resolution=64"].map(str::to_owned));
+    let expected = Config::load("hexplane-dnerf-cpu+medium", &["seed=7", "data.resolution=64"].map(str::to_owned));
     assert_eq!(config, expected.expect("a configuration"));
     assert_eq!(layers::split("a++b+"), ["a", "", "b", ""]);
     let missing = run.join("missing.toml").display().to_string();
@@ -253,13 +253,13 @@ fn a_path_may_have_the_sign_that_joins_names() {
 #[test]
 fn overrides_come_last() {
     let overrides = ["train.fine_iterations=200", "device = flex", "data.resolution=0", "eval.splits=[\"val\"]"];
-    let config = Config::load("dnerf-cpu", &overrides.map(str::to_owned)).expect("a configuration");
+    let config = Config::load("hexplane-dnerf-cpu", &overrides.map(str::to_owned)).expect("a configuration");
     assert_eq!(config.train.fine_iterations, 200);
     assert_eq!(config.device, DeviceName::Flex);
     assert_eq!(config.data.resolution, None);
     assert_eq!(config.eval.splits, [EvalSplit::Val]);
     for device in ["ndarray", "wgpu", "wgpu:0", "wgpu:discrete", "wgpu:cpu"] {
-        let config = Config::load("dnerf-cpu", &[format!("device={device}")]).expect("a configuration");
+        let config = Config::load("hexplane-dnerf-cpu", &[format!("device={device}")]).expect("a configuration");
         assert_eq!(config.device.to_string(), device);
     }
     for (bad, part) in [
@@ -303,7 +303,7 @@ fn an_unknown_choice_is_named_with_its_key_and_the_nearest_one() {
 fn density_strategies_are_checked_with_the_rest() {
     // Where none is to come, pruning may begin at once; where some are, they come first.
     let overrides = ["train.densify.strategy=none", "train.prune.fraction=0.1", "train.prune.iterations=[5]"];
-    let text = format!("extends = 'dnerf-cpu'\n{}", overrides.join("\n").replace("=none", "='none'"));
+    let text = format!("extends = 'hexplane-dnerf-cpu'\n{}", overrides.join("\n").replace("=none", "='none'"));
     Config::from_toml(&text, "text").expect("a configuration");
     let text = problem_text(Config::from_toml(&text.replace("'none'", "'adaptive'"), "text"));
     assert!(text.contains("pruning follows densification, which ends at 3500"), "{text}");
@@ -312,7 +312,7 @@ fn density_strategies_are_checked_with_the_rest() {
 #[test]
 fn unknown_presets_and_missing_files_are_named() {
     let text = problem_text(Config::load("dnerf-cp", &[]));
-    assert!(text.contains("\"dnerf-cp\"") && text.contains("the nearest preset is \"dnerf-cpu\""), "{text}");
+    assert!(text.contains("\"dnerf-cp\"") && text.contains("the nearest preset is \"dnerf\""), "{text}");
     let text = problem_text(Config::load("nowhere/mine.toml", &[]));
     assert!(text.starts_with("nowhere/mine.toml: cannot read the configuration"), "{text}");
     let folder = folder_with("mine.toml", "extends = \"dnref\"");

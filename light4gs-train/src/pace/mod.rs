@@ -236,7 +236,7 @@ mod tests {
 
     #[test]
     fn the_rate_is_what_it_adds_to_an_iteration() {
-        let config = Config::load("dnerf-cpu+nodes", &["compression.rate.interval=5".to_owned()]).unwrap();
+        let config = Config::load("dnerf", &["compression.rate.interval=5".to_owned()]).unwrap();
         let iteration = |gaussians: usize, seconds: f64| Iteration { gaussians, seconds };
         let mut fine = vec![iteration(1000, 1.0); PLAIN];
         for _ in sizes(&config) {
@@ -256,7 +256,7 @@ mod tests {
 
     #[test]
     fn expected_bits_are_not_corrected_while_it_is_measured() {
-        for preset in ["dnerf-cpu+nodes", "neu3d-cpu", "hypernerf-cpu+medium"] {
+        for preset in ["dnerf", "neu3d", "hypernerf+medium"] {
             let config = Config::load(preset, &[]).unwrap();
             let moment = moment_of(&config).train.fine_iterations;
             assert!(!(1..=fine_iterations(&config)).any(|iteration| is_due(iteration, moment)), "{preset}");
@@ -270,7 +270,7 @@ mod tests {
         let seconds = |overrides: &[&str]| {
             let common = ["train.prune.fraction=0", "compression.rate.lambda=0", "train.coarse_iterations=0"];
             let overrides: Vec<String> = common.iter().chain(overrides).map(|key| (*key).to_owned()).collect();
-            let config = Config::load("dnerf-cpu+nodes", &overrides).unwrap();
+            let config = Config::load("dnerf", &overrides).unwrap();
             let adaptive = &config.train.densify.strategies.adaptive;
             let AdaptiveDensityConfig { from, until, interval, .. } = *adaptive;
             assert_eq!((from, until, interval, config.train.fine_iterations), (200, 5000, 100, 12_000));
@@ -298,7 +298,7 @@ mod tests {
             "train.photometric.l2_until=0",
             "model.nodes.lifetime=true",
         ];
-        let config = Config::load("dnerf-cpu+nodes", &keys.map(str::to_owned)).unwrap();
+        let config = Config::load("dnerf", &keys.map(str::to_owned)).unwrap();
         let of = |guided| Pace { coarse: 0.0, first, full: vec![full; sizes(&config).len()], rate: 0.0, guided };
         assert_eq!((of(0).most_gaussians(&config), of(500).most_gaussians(&config)), (10_000, 11_000));
         // Half a second for 500 Gaussians: in 6000 iterations, and once more in 3000.

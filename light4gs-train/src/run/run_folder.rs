@@ -16,6 +16,7 @@ use super::list_checkpoints;
 use super::lock::RunLock;
 use crate::config::Config;
 use crate::error::TrainError;
+use crate::provenance::{self, COMMIT};
 use crate::utc;
 
 /// JSON files of a run are far shorter.
@@ -37,6 +38,9 @@ pub struct RunRecord {
     /// Device on which the run began.
     #[serde(default)]
     pub device: String,
+    /// Processor and cores of the machine on which it began.
+    #[serde(default)]
+    pub machine: String,
     /// Threads with which it began.
     #[serde(default)]
     pub threads: usize,
@@ -64,8 +68,9 @@ impl RunRecord {
         Ok(Self {
             scene,
             version: env!("CARGO_PKG_VERSION").to_owned(),
-            commit: env!("LIGHT4GS_COMMIT").to_owned(),
-            device: config.device.to_string(),
+            commit: COMMIT.to_owned(),
+            device: crate::device::chosen(config.device).to_string(),
+            machine: provenance::machine(),
             threads: rayon::current_num_threads(),
             begun: utc::now(),
             configuration: config.digest_text(),

@@ -11,7 +11,7 @@ use serde::{Deserialize, Serialize};
 
 use super::base::HIDDEN;
 use super::plan::{PlannedSegment, TakePlan};
-use crate::config::{Config, MAX_CONFIG_BYTES};
+use crate::config::{Config, MAX_CONFIG_BYTES, Overrides};
 use crate::error::TrainError;
 use crate::run::RunFolder;
 use crate::sampling::SamplerKind;
@@ -24,6 +24,9 @@ const BASE_FROM_SEGMENT: &str = "../../base/scene.l4gs";
 /// Images of the base, about: enough to see every place several times, few enough to be read quickly.
 const BASE_IMAGES: usize = 300;
 const FEWEST_BASE_TIMES: usize = 24;
+/// At most, bytes of a take's front without the rows of its segments, and of a row with the hidden list of a segment.
+const FRONT_BYTES: usize = 1500;
+const ROW_BYTES: usize = 500;
 
 /// `take.json`.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -95,7 +98,7 @@ impl TakeFolder {
     ///
     /// # Errors
     /// [`TrainError::Input`] where a segment is not trained yet, and as [`TakePlan::extended`].
-    pub fn extend(&mut self, scene: &Path, data: &Scene, seconds: f64) -> Result<(), TrainError> {
+    pub fn extend(&mut self, scene: &Path, data: &Scene, seconds: f64, cuts: &[usize]) -> Result<(), TrainError> {
         let scene = std::path::absolute(scene).map_err(DataError::io("find", scene))?;
         if scene == self.record.scene && self.record.plan.has_all_of(data) {
             // An extension that was stopped goes on.
@@ -107,7 +110,7 @@ impl TakeFolder {
                 "segment {number} of {root} is not trained yet; finish it first, with the `train` command that began the take"
             )));
         }
-        self.record.plan = self.record.plan.extended(data, seconds)?;
+        self.record.plan = self.record.plan.extended(data, seconds, cuts)?;
         self.record.scene = scene;
         self.write_record()
     }
@@ -164,23 +167,50 @@ impl TakeFolder {
         self.root.join("take.l4gs")
     }
 
-    /// The configuration of the base: nothing moves, and few times are used, in any order.
+    /// The configuration of the base: nothing moves, and few times are used, in any order. `compression.target_bytes` is that of
+    /// the take; the base has a share of it.
     pub fn config_of_base(&self) -> Config {
-        let mut config = self.config.clone();
+        let plan = &self.record.plan;
+        let growth = plan.base_growth;
+        let mut config = self.config.for_schedule(growth, &Overrides::default());
+        let most = &mut config.train.densify.strategies.adaptive.max_gaussians;
+        *most = (*most as f64 * growth).round() as usize;
         config.model.field = FieldKind::Still;
         config.data.most_times = Some(self.record.base_times);
         config.train.sampling = SamplerKind::Shuffled;
         config.train.guided_sampling.iterations.clear();
         config.train.losses.photometric.l2_until = 0;
+        config.compression.target_bytes = (self.config.compression.target_bytes as f64 * plan.base_share()) as usize;
+        // What moves is missing in it.
+        config.compression.target_db = 0.0;
         config
     }
 
-    /// The configuration of a segment.
-    pub fn config_of_segment(&self, segment: &PlannedSegment) -> Config {
+    /// The configuration of a segment. `compression.target_bytes` is that of the take; what the base leaves of it is shared alike.
+    ///
+    /// # Errors
+    /// [`TrainError::Input`] where the take has a target that the base alone exceeds; [`TrainError::Data`] where the base is
+    /// not there yet.
+    pub fn config_of_segment(&self, segment: &PlannedSegment) -> Result<Config, TrainError> {
         let mut config = self.config.clone();
         config.model.base = Some(BASE_FROM_SEGMENT.into());
         config.data.between = self.record.plan.between(segment);
-        config
+        let target = config.compression.target_bytes;
+        if target > 0 {
+            let file = self.base().join("scene.l4gs");
+            let base = std::fs::metadata(&file).map_err(DataError::io("read", &file))?.len() as usize;
+            let count = self.record.plan.segments.len();
+            let each = target.saturating_sub(base + FRONT_BYTES) / count;
+            config.compression.target_bytes = each.saturating_sub(ROW_BYTES);
+            if config.compression.target_bytes == 0 {
+                return Err(TrainError::Input(format!(
+                    "--target-bytes {target}: the base of this take has {base} bytes, which leaves nothing for its {count} segments; \
+                     give at least {}",
+                    2 * (base + FRONT_BYTES + count * ROW_BYTES)
+                )));
+            }
+        }
+        Ok(config)
     }
 
     /// The segments whose files are there, by number.

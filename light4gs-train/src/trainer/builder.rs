@@ -365,10 +365,7 @@ impl<F: DeformationField, E: EntropyModels> TrainerBuilder<F, E> {
         }
         all.extend(observers);
         // A graphics card is busy with a single view.
-        let side_by_side = match &self.device {
-            Some(device) => device::computes_on_processor(device),
-            None => config.device.computes_on_processor(),
-        };
+        let side_by_side = device::computes_on_processor(&device);
         let view_pools = if side_by_side { ViewPools::new(config.train.batch_size) } else { ViewPools::none() };
         let candidates = CandidateFrames::new(&data.train);
         Ok(Trainer {

@@ -204,7 +204,7 @@ mod tests {
     ];
 
     fn config(keys: &[&str]) -> Result<Config, crate::config::ConfigError> {
-        Config::load("dnerf-cpu+nodes", &keys.iter().map(|key| (*key).to_owned()).collect::<Vec<_>>())
+        Config::load("dnerf", &keys.iter().map(|key| (*key).to_owned()).collect::<Vec<_>>())
     }
 
     fn trainer(images: MemoryImages) -> Trainer {

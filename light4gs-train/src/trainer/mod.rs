@@ -95,7 +95,7 @@ use views::ViewPools;
 /// let frames = SplitFrames { test: frames.clone(), train: frames, ..SplitFrames::default() };
 /// let data = Scene::new("memory", Path::new("ball"), frames, PointCloud::random(200, 0.8, 0), [1.0; 3])?;
 ///
-/// let mut config = Config::from_preset("dnerf-cpu")?;
+/// let mut config = Config::from_preset("hexplane-dnerf-cpu")?;
 /// config.device = DeviceName::Flex;
 /// config.train.coarse_iterations = 5;
 /// config.train.fine_iterations = 5;

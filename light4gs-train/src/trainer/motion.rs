@@ -236,7 +236,7 @@ mod tests {
     }
 
     fn config(iterations: usize) -> Config {
-        let mut config = Config::from_preset("dnerf-cpu").unwrap();
+        let mut config = Config::from_preset("hexplane-dnerf-cpu").unwrap();
         config.device = DeviceName::Flex;
         config.train.coarse_iterations = 2;
         config.train.fine_iterations = iterations;

@@ -292,7 +292,7 @@ mod tests {
     /// Also with planes, whose latents have noise from the device's generator.
     #[test]
     fn what_is_computed_again_is_the_same() {
-        let mut trainer = trainer("dnerf-cpu", DeviceName::Flex);
+        let mut trainer = trainer("hexplane-dnerf-cpu", DeviceName::Flex);
         (0..4).for_each(|_| drop(trainer.step().unwrap()));
         let noisy = trainer.quantization_noise(Stage::Fine, 3).unwrap().unwrap();
         let [first, second] = [(), ()].map(|()| trainer.differentiate(Stage::Fine, 3, &[0, 1], Some(&noisy)).unwrap());
@@ -306,7 +306,7 @@ mod tests {
     #[test]
     fn a_step_whose_lists_had_no_room_is_computed_again() {
         let losses = |squeezed: bool| {
-            let mut trainer = trainer("dnerf-cpu+nodes", DeviceName::Wgpu(crate::config::Adapter::Strongest));
+            let mut trainer = trainer("dnerf", DeviceName::Wgpu(crate::config::Adapter::Strongest));
             let mut losses = Vec::new();
             loop {
                 if squeezed {

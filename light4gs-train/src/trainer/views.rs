@@ -231,7 +231,7 @@ mod tests {
     #[test]
     fn training_goes_from_coarse_to_fine() {
         const SIDE: u32 = 401;
-        let mut config = Config::from_preset("dnerf-cpu").unwrap();
+        let mut config = Config::from_preset("hexplane-dnerf-cpu").unwrap();
         config.device = DeviceName::Flex;
         (config.train.coarse_iterations, config.train.fine_iterations) = (1, 4);
         config.train.coarse_to_fine.half_until = 0.5;

@@ -1,19 +1,20 @@
-//! `bench`: the tables of `light4gs_lab::benchmark` and `light4gs_lab::benchmark::codec`.
+//! `bench`: the tables of `light4gs_lab::benchmark` and `light4gs_lab::benchmark::codec`, or records of the same.
 
 use std::fmt::Display;
 use std::path::PathBuf;
 
 use burn::tensor::Device;
 use clap::Args;
-use light4gs_lab::benchmark::codec::{codec_benchmark, codec_table};
-use light4gs_lab::benchmark::host::{host_benchmark, host_table};
-use light4gs_lab::benchmark::{BenchScene, benchmark, table};
+use light4gs_lab::benchmark::codec::{codec_benchmark, codec_rows, codec_table};
+use light4gs_lab::benchmark::host::{host_benchmark, host_rows, host_table};
+use light4gs_lab::benchmark::{BenchScene, benchmark, rows, table};
+use light4gs_lab::record::{Provenance, Record, Row};
 use light4gs_train::config::DeviceName;
 use light4gs_train::device;
 use light4gs_train::error::TrainError;
-use serde::Serialize;
 
-use super::output::{say, say_json};
+use super::command_line::command_line;
+use super::output::say;
 
 #[derive(Debug, Args)]
 pub(super) struct Bench {
@@ -38,7 +39,7 @@ pub(super) struct Bench {
     /// Time the host's part of a step instead: 100 Gaussians at 32×32, with launches and read-backs.
     #[arg(long, conflicts_with_all = ["scene", "gaussians", "size", "codec"])]
     host: bool,
-    /// Print as JSON.
+    /// Print as JSON, with command, commit, machine and date: the form of the files in `results/`.
     #[arg(long)]
     json: bool,
 }
@@ -47,12 +48,12 @@ impl Bench {
     pub(super) fn run(self) -> Result<(), TrainError> {
         let repeats = self.repeats as usize;
         if self.codec {
-            return output(self.json, &codec_benchmark(repeats)?, codec_table);
+            return output(self.json, &codec_benchmark(repeats)?, codec_table, codec_rows);
         }
         if self.host {
             let of = |(name, device)| host_benchmark(name, &device, repeats);
             let times: Result<Vec<_>, _> = self.device.into_iter().map(|name| opened(name).and_then(of)).collect();
-            return output(self.json, &times?, host_table);
+            return output(self.json, &times?, host_table, host_rows);
         }
         let mut scenes = Vec::new();
         for path in &self.scene {
@@ -74,7 +75,7 @@ impl Bench {
         }
         let of = |(name, device)| benchmark(name, &device, &scenes, repeats);
         let results: Result<Vec<_>, _> = self.device.into_iter().map(|name| opened(name).and_then(of)).collect();
-        output(self.json, &results?, table)
+        output(self.json, &results?, table, rows)
     }
 }
 
@@ -82,6 +83,14 @@ fn opened(name: DeviceName) -> Result<(DeviceName, Device), TrainError> {
     Ok((name, device::open(name)?))
 }
 
-fn output<T: Serialize, D: Display>(json: bool, results: &Vec<T>, table: fn(&[T]) -> D) -> Result<(), TrainError> {
-    if json { say_json(results) } else { say(table(results)) }
+fn output<T, D: Display>(
+    json: bool,
+    results: &[T],
+    table: fn(&[T]) -> D,
+    rows: fn(&[T]) -> Vec<Row>,
+) -> Result<(), TrainError> {
+    if !json {
+        return say(table(results));
+    }
+    say(Record { provenance: Provenance::of_this_program(command_line()), rows: rows(results) })
 }

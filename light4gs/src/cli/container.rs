@@ -59,7 +59,7 @@ pub(super) struct Encode {
     /// first few bytes.
     #[arg(long, value_name = "NUMBER")]
     layers: Option<usize>,
-    /// Back end: ndarray, flex, wgpu, or wgpu with an adapter such as wgpu:0.
+    /// Back end: auto (a graphics card where there is one), ndarray, flex, wgpu, or wgpu with an adapter such as wgpu:0.
     #[arg(long)]
     device: Option<DeviceName>,
     /// Print the result as JSON.

@@ -2,6 +2,7 @@
 
 mod bench;
 mod check;
+mod command_line;
 mod compare;
 mod completions;
 mod container;
@@ -59,7 +60,7 @@ enum Command {
     Check(check::Check),
     /// Train on a dataset, or on videos, which are prepared first.
     #[command(
-        after_help = "Examples:\n  light4gs train data/dnerf/bouncing --config dnerf-bouncing-cpu --out runs/bouncing\n  light4gs train walk.mp4 --out runs/walk"
+        after_help = "Examples:\n  light4gs train data/dnerf/bouncing --out runs/bouncing\n  light4gs train walk.mp4 --out runs/walk"
     )]
     Train(train::Train),
     /// Continue a run from its last checkpoint. The result is that of an uninterrupted run.
@@ -102,7 +103,7 @@ enum Command {
     Synth(synth::Synth),
     /// Make a table or a figure of the paper: train variants of a scene, and compare them.
     #[command(
-        after_help = "Example:\n  light4gs study context-model data/dnerf/flag --config dnerf-flag-cpu --seeds 3 --out runs/context"
+        after_help = "Example:\n  light4gs study context-model data/dnerf/flag --config hexplane-dnerf-flag-cpu --seeds 3 --out runs/context"
     )]
     Study(study::Study),
     /// Write a study's tables and report again from its finished runs, and name the missing runs.

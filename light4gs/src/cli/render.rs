@@ -60,7 +60,7 @@ pub(super) struct Render {
     /// Frames a second of a GIF or an MP4.
     #[arg(long, default_value_t = 20.0, allow_negative_numbers = true)]
     fps: f32,
-    /// Back end: ndarray, flex, wgpu, or wgpu with an adapter such as wgpu:0.
+    /// Back end: auto (a graphics card where there is one), ndarray, flex, wgpu, or wgpu with an adapter such as wgpu:0.
     #[arg(long, default_value_t)]
     device: DeviceName,
     #[command(flatten)]

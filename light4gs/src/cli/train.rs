@@ -17,7 +17,7 @@ use light4gs_train::metrics::lpips::Lpips;
 use light4gs_train::metrics::scores::Scores;
 use light4gs_train::run::{RunFolder, RunRecord};
 use light4gs_train::table::{Align, Table};
-use light4gs_train::take::TakeFolder;
+use light4gs_train::take::{SegmentLength, TakeFolder};
 use light4gs_train::trainer::{Trainer, TrainerBuilder};
 
 use super::check::{refuse_problems, tell_capture, understand};
@@ -26,7 +26,7 @@ use super::limits::LimitsArgument;
 use super::output::progress::ProgressBars;
 use super::output::{say, say_json, tell};
 use super::signals::stop_flag;
-use super::take::{self, train_take};
+use super::take::{self, plan_of, train_take};
 use super::videos;
 use super::wishes::{Wishes, check_quality};
 
@@ -51,8 +51,8 @@ pub(super) struct Train {
     /// the folder OUT-prepared (see `light4gs prepare`). An interrupted command continues where it stopped.
     #[arg(required = true, value_name = "SCENE|VIDEO")]
     scene: Vec<PathBuf>,
-    /// A preset (see docs/configuration.md) or a TOML file. Without it: the preset of the dataset's layout, such as
-    /// dnerf-cpu+nodes.
+    /// A preset (see docs/configuration.md) or a TOML file. Without it: the preset of the dataset's layout, such as dnerf, with
+    /// control nodes. The paper's hexplane: hexplane-dnerf-cpu, paper-dnerf+paper-coding.
     #[arg(long, value_name = "PRESET|FILE")]
     config: Option<String>,
     /// Layout of the dataset; without it, it is found by content (see docs/data.md).
@@ -64,15 +64,16 @@ pub(super) struct Train {
     /// Changes one key of the configuration; may be given more than once.
     #[arg(long = "set", value_name = "KEY=VALUE")]
     overrides: Vec<String>,
-    /// Back end: ndarray, flex, wgpu, or wgpu with an adapter such as wgpu:0.
+    /// Back end: auto (a graphics card where there is one), ndarray, flex, wgpu, or wgpu with an adapter such as wgpu:0.
     #[arg(long)]
     device: Option<DeviceName>,
     #[command(flatten)]
     wishes: Wishes,
-    /// Train a take: a base that stands still, and segments of about so many seconds, which play as one file. For captures of more
-    /// than some ten seconds. The same command goes on where it was stopped.
-    #[arg(long, value_name = "SECONDS", value_parser = seconds)]
-    segment: Option<f64>,
+    /// Train a take: a base that stands still, and segments of about this number of seconds, which play as one file. `auto`: two
+    /// seconds, but 45 to 90 frames. No segment goes beyond a cut. For captures of more than some ten seconds. The same command goes
+    /// on where it was stopped.
+    #[arg(long, value_name = "SECONDS|auto", value_parser = segment_length)]
+    segment: Option<SegmentLength>,
     #[command(flatten)]
     launch: LaunchOptions,
     /// Replace an existing run.
@@ -102,26 +103,43 @@ impl Train {
         if self.segment.is_none() && (self.launch.jobs > 1 || self.launch.launcher != Launcher::Local) {
             return Err(TrainError::Input("--jobs and --launcher are for takes; give --segment SECONDS too".into()));
         }
-        if self.segment.is_some() {
-            self.wishes.refuse_for_several()?;
-        }
-        // What is announced is the time of one training.
-        let quiet = self.output.quiet || self.segment.is_some();
-        let config = self.wishes.config(&preset, &overrides, &scene, automatic, quiet)?;
-        match self.segment {
-            Some(segment) => train_take(&config, &scene, &self.out, segment, &self.launch, self.output.quiet),
-            None => train(config, &scene, &self.out, self.overwrite, &self.output),
-        }
+        let Some(length) = self.segment else {
+            let config = self.wishes.config(&preset, &overrides, &scene, automatic, self.output.quiet)?;
+            return train(on_chosen_device(config), &scene, &self.out, self.overwrite, &self.output);
+        };
+        let plan = plan_of(&Config::load(&preset, &overrides)?, &scene, length)?;
+        // On a cluster each job has a machine, and its own devices; jobs here share them.
+        let on_cluster = self.launch.launcher == Launcher::Slurm;
+        let machines = if on_cluster { self.launch.jobs } else { 1 };
+        let config = self.wishes.config_of_take(&preset, &overrides, &scene, automatic, &plan, machines)?;
+        let config = if on_cluster { config } else { on_chosen_device(config) };
+        train_take(&config, &scene, &self.out, plan, &self.launch, self.output.quiet)
     }
+}
+
+/// The configuration with the device that `auto` means here, which is said, so that a run that is resumed has the same.
+fn on_chosen_device(config: Config) -> Config {
+    let device = device::chosen(config.device);
+    if config.device == DeviceName::Auto {
+        let why = match device {
+            DeviceName::Wgpu(_) => "a graphics card; --device flex computes on the processor",
+            _ => "no graphics card was found",
+        };
+        tell(format_args!("device: {device} ({why})"));
+    }
+    Config { device, ..config }
 }
 
 /// Captures that last longer, in seconds, are better trained in segments.
 const LONGEST_CLIP: f64 = 15.0;
 
 /// The length of a segment.
-fn seconds(text: &str) -> Result<f64, String> {
+fn segment_length(text: &str) -> Result<SegmentLength, String> {
+    if text == "auto" {
+        return Ok(SegmentLength::Usual);
+    }
     let seconds = text.parse::<f64>().ok().filter(|seconds| (0.1..=600.0).contains(seconds));
-    seconds.ok_or_else(|| "expected seconds, from 0.1 to 600".to_owned())
+    seconds.map(SegmentLength::Seconds).ok_or_else(|| "expected seconds, from 0.1 to 600, or auto".to_owned())
 }
 
 /// Trains a new run and measures it, up to the report.
@@ -141,7 +159,7 @@ pub(super) fn train(
     if let Some(seconds) = data.seconds.filter(|seconds| *seconds > LONGEST_CLIP) {
         tell(format_args!(
             "note: this capture lasts {seconds:.0} seconds and is trained as one clip, whose motion must be learned at once; \
-             `--segment 2` trains it as a take, in segments (docs/takes.md)"
+             `--segment auto` trains it as a take, in segments (docs/takes.md)"
         ));
     }
     // If the encoder would refuse the scene, for example for a point at 3e38, the run that --overwrite replaces must
@@ -292,7 +310,7 @@ pub(super) struct Eval {
     /// Folder of the dataset, if it is not the run's own.
     #[arg(long)]
     scene: Option<PathBuf>,
-    /// Back end: ndarray, flex, wgpu, or wgpu with an adapter such as wgpu:0.
+    /// Back end: auto (a graphics card where there is one), ndarray, flex, wgpu, or wgpu with an adapter such as wgpu:0.
     #[arg(long)]
     device: Option<DeviceName>,
     /// Weights of LPIPS (see docs/metrics.md), in place of the configuration's `eval.lpips`; may be given more than once.

@@ -9,6 +9,7 @@ use light4gs_train::config::{Config, Overrides};
 use light4gs_train::dataset::load_options;
 use light4gs_train::error::TrainError;
 use light4gs_train::pace::Pace;
+use light4gs_train::take::TakePlan;
 
 use super::output::tell;
 
@@ -19,7 +20,7 @@ const SHORTEST: f64 = 0.05;
 /// No schedule is made longer than this: the quality has long stopped growing.
 const LONGEST: f64 = 50.0;
 
-#[derive(Debug, Args)]
+#[derive(Clone, Copy, Debug, Args)]
 pub(super) struct Wishes {
     /// Pixels of the longer side of the training images; smaller images are not enlarged. Adapts the number of Gaussians.
     #[arg(long, value_name = "NUMBER", value_parser = clap::value_parser!(u32).range(8..=16_384))]
@@ -39,25 +40,6 @@ pub(super) struct Wishes {
 }
 
 impl Wishes {
-    /// Refuses a wish for the time of one training, or for the size or the quality of one file, where there are several.
-    ///
-    /// # Errors
-    /// [`TrainError::Input`] with what to give in its place.
-    pub(super) fn refuse_for_several(&self) -> Result<(), TrainError> {
-        let named = [
-            ("--minutes", self.minutes.is_some()),
-            ("--target-bytes", self.target_bytes.is_some()),
-            ("--target-db", self.target_db.is_some()),
-        ];
-        match named.iter().find(|(_, given)| *given) {
-            Some((name, _)) => Err(TrainError::Input(format!(
-                "{name} is for one scene, and --segment trains several; give a preset of a size, such as `+medium` or \
-                 `+small`, or the keys that you mean by --set"
-            ))),
-            None => Ok(()),
-        }
-    }
-
     /// The configuration that presets, wishes and overrides give; the overrides win. Where the preset is `automatic`,
     /// the number of Gaussians follows the images even without a wish. Says how long the training will take, unless it
     /// is short or `quiet`.
@@ -76,7 +58,39 @@ impl Wishes {
         let by_hand = Overrides::parse(overrides)?;
         let config = self.sized(config, preset, &by_hand, scene, automatic)?;
         let config = self.targeted(config, &by_hand)?;
-        self.timed(config, &by_hand, scene, quiet)
+        self.timed(config, &by_hand, |config| Ok(Scene::open(scene, &load_options(config))?), 1.0, quiet)
+    }
+
+    /// The same for a take: the time is that of all its parts, with `machines` of them at work, and the target is that of its
+    /// file. Nothing is announced.
+    ///
+    /// # Errors
+    /// As [`Wishes::config`].
+    pub(super) fn config_of_take(
+        &self,
+        preset: &str,
+        overrides: &[String],
+        scene: &Path,
+        automatic: bool,
+        plan: &TakePlan,
+        machines: u32,
+    ) -> Result<Config, TrainError> {
+        let config = Config::load(preset, overrides)?;
+        let by_hand = Overrides::parse(overrides)?;
+        let config = self.sized(config, preset, &by_hand, scene, automatic)?;
+        let of_segment =
+            |bytes: usize| (bytes as f64 * (1.0 - plan.base_share()) / plan.segments.len() as f64) as usize;
+        // The weight of a byte is that for a segment's share, and the target that of the whole.
+        let part = Self { target_bytes: self.target_bytes.map(of_segment), ..*self };
+        let mut config = part.targeted(config, &by_hand)?;
+        if let Some(bytes) = self.target_bytes
+            && !by_hand.has("compression.target_bytes")
+        {
+            config.compression.target_bytes = bytes;
+        }
+        let [from, to] = plan.between(&plan.segments[0]);
+        let data = |config: &Config| Ok(Scene::open(scene, &load_options(config))?.between(from, to)?);
+        part.timed(config, &by_hand, data, plan.clips() / f64::from(machines), true)
     }
 
     /// The configuration for the wished size of the images.
@@ -107,18 +121,25 @@ impl Wishes {
         Ok(config)
     }
 
-    /// The configuration for the wished length of the training. Measures this machine if the length is wished, or is to be
-    /// announced.
-    fn timed(&self, mut config: Config, by_hand: &Overrides, scene: &Path, quiet: bool) -> Result<Config, TrainError> {
+    /// The configuration for the wished length of the training of `scenes` scenes like that of `data`. Measures this machine if
+    /// the length is wished, or is to be announced.
+    fn timed(
+        &self,
+        mut config: Config,
+        by_hand: &Overrides,
+        data: impl FnOnce(&Config) -> Result<Scene, TrainError>,
+        scenes: f64,
+        quiet: bool,
+    ) -> Result<Config, TrainError> {
         let estimated = !quiet && config.train.coarse_iterations + config.train.fine_iterations >= FEWEST_ESTIMATED;
         if self.minutes.is_none() && !estimated {
             return Ok(config);
         }
-        let data = Scene::open(scene, &load_options(&config))?;
+        let data = data(&config)?;
         let camera = data.train.first().map(|frame| frame.camera);
         let pace = Pace::measure(&config, data)?;
         if let Some(minutes) = self.minutes {
-            config = in_minutes(minutes, &pace, |factor| config.for_schedule(factor, by_hand))?;
+            config = in_minutes(minutes, scenes, &pace, |factor| config.for_schedule(factor, by_hand))?;
             config.validate()?;
         }
         if !quiet && let Some(camera) = camera {
@@ -133,13 +154,13 @@ fn longest_side(data: &Scene) -> u32 {
     data.train.iter().map(|frame| frame.source_width.max(frame.source_height)).max().unwrap_or(0).max(1)
 }
 
-/// The schedule whose training takes this many minutes; `scaled` gives the configuration with a schedule `factor` times as
+/// The schedule with which the training of `scenes` scenes takes this many minutes; `scaled` gives the configuration with a schedule `factor` times as
 /// long.
 ///
 /// # Errors
 /// [`TrainError::Input`] if even the shortest schedule takes longer, or the longest one less.
-fn in_minutes(minutes: f64, pace: &Pace, scaled: impl Fn(f64) -> Config) -> Result<Config, TrainError> {
-    let minutes_of = |factor: f64| pace.training_seconds(&scaled(factor)) / 60.0;
+fn in_minutes(minutes: f64, scenes: f64, pace: &Pace, scaled: impl Fn(f64) -> Config) -> Result<Config, TrainError> {
+    let minutes_of = |factor: f64| scenes * pace.training_seconds(&scaled(factor)) / 60.0;
     let [least, most] = [SHORTEST, LONGEST].map(minutes_of);
     if !(least..=most).contains(&minutes) {
         return Err(TrainError::Input(format!(

@@ -12,6 +12,7 @@ from .container import VERSION, read_extra_entries
 from .decoder import decode
 from .entropy.range_coder import AdaptiveBit, RangeDecoder
 from .errors import Refused
+from .networks.arithmetic import exponential, logarithm
 from .reader import Reader
 from .sections.gaussians import FIRST_ATTRIBUTES
 from .sections.motion import Scene
@@ -21,6 +22,8 @@ PRELUDE_BYTES = 44
 ROW_BYTES = 64
 _LONGEST = 1e9
 _CONTEXT_BITS = 6
+_MOST_LOGIT = 80
+_NAMES = [*(name for name, _ in FIRST_ATTRIBUTES), "sh_rest"]
 
 
 @dataclass
@@ -50,30 +53,56 @@ class Take:
 
     def at(self, seconds: float) -> dict[str, np.ndarray]:
         """The attributes of the Gaussians that are drawn, without further ones."""
-        base = self.base.attributes()
-        for segment in self.segments:
-            begin, end, stream_begin, stream_end = segment.times
-            if begin <= seconds < end:
-                share = (seconds - stream_begin) / (stream_end - stream_begin)
-                moved = segment.scene.at(np.float32(min(max(share, 0.0), 1.0)))
-                drawn = np.array([not bit for bit in segment.hidden] or [True] * len(base["means"]), bool)
-                return _together({name: values[drawn] for name, values in base.items()}, moved)
-        return _together(base, None)
+        base = {name: self.base.attributes()[name] for name in _NAMES}
+        drawn = self._drawn_at(seconds)
+        visible = np.ones(len(base["means"]), bool)
+        if drawn:
+            shown = np.array([~np.array(segment.hidden, bool) if segment.hidden else visible for segment, _ in drawn])
+            visible = shown.any(0)
+            base["opacity_logits"] = base["opacity_logits"].copy()
+            for (_, weight), by_this_one in zip(drawn, shown):
+                alone = by_this_one & (shown.sum(0) == 1)
+                base["opacity_logits"][alone] = _faded(base["opacity_logits"][alone], weight)
+        parts = [{name: values[visible] for name, values in base.items()}]
+        for segment, weight in drawn:
+            _, _, stream_begin, stream_end = segment.times
+            share = (seconds - stream_begin) / (stream_end - stream_begin)
+            moved = segment.scene.at(np.float32(min(max(share, 0.0), 1.0)))
+            parts.append({**moved, "opacity_logits": _faded(moved["opacity_logits"], weight)})
+        return _together(parts)
+
+    def _drawn_at(self, seconds: float) -> list[tuple[Segment, np.float32]]:
+        """The segments that are drawn, and their weights: two within a fade."""
+        for earlier, later in zip(self.segments, self.segments[1:]):
+            if earlier.times[1] == later.times[0]:
+                begin = max(later.times[2], _middle(earlier))
+                end = min(max(earlier.times[3], earlier.times[1]), _middle(later))
+                if begin < seconds < end:
+                    weight = (seconds - begin) / (end - begin)
+                    return [(earlier, np.float32(1.0 - weight)), (later, np.float32(weight))]
+        return [(segment, np.float32(1)) for segment in self.segments if segment.times[0] <= seconds < segment.times[1]]
 
 
-def _together(base: dict[str, np.ndarray], segment: dict[str, np.ndarray] | None) -> dict[str, np.ndarray]:
-    """The Gaussians of the base, then those of the segment, with harmonics of the larger degree."""
-    names = [*(name for name, _ in FIRST_ATTRIBUTES), "sh_rest"]
-    if segment is None:
-        return {name: base[name] for name in names}
-    width = max(base["sh_rest"].shape[1], segment["sh_rest"].shape[1])
-    result = {}
-    for name in names:
-        parts = [base[name], segment[name]]
-        if name == "sh_rest":
-            parts = [np.pad(part, ((0, 0), (0, width - part.shape[1]))) for part in parts]
-        result[name] = np.concatenate(parts)
-    return result
+def _middle(segment: Segment) -> float:
+    return 0.5 * (segment.times[0] + segment.times[1])
+
+
+def _faded(logits: np.ndarray, weight: np.float32) -> np.ndarray:
+    """The logits of the opacities `1 - (1 - o)^weight`."""
+    if weight == 1:
+        return logits
+    most = np.float32(_MOST_LOGIT)
+    clipped = np.fmin(np.fmax(logits, -most), most)
+    density = logarithm(np.float32(1) + exponential(clipped))
+    return np.fmax(logarithm(exponential(weight * density) - np.float32(1)), -most)
+
+
+def _together(parts: list[dict[str, np.ndarray]]) -> dict[str, np.ndarray]:
+    """The Gaussians of the base, then those of the segments, with harmonics of the largest degree."""
+    width = max(part["sh_rest"].shape[1] for part in parts)
+    for part in parts:
+        part["sh_rest"] = np.pad(part["sh_rest"], ((0, 0), (0, width - part["sh_rest"].shape[1])))
+    return {name: np.concatenate([part[name] for part in parts]) for name in _NAMES}
 
 
 def is_take(data: bytes) -> bool:

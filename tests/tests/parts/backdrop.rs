@@ -2,6 +2,7 @@
 
 use burn::tensor::{Device, Int, Tensor};
 use light4gs_codec::GaussianArrays;
+use light4gs_codec::take::{SegmentPart, drawn_together};
 use light4gs_data::{Camera, PointCloud};
 use light4gs_model::{Backdrop, Gaussians, GaussiansConfig, PixelContribution, Rendering, Significance, Splatter};
 use light4gs_tests::golden::{assert_close_relative, devices, values_of};
@@ -24,7 +25,8 @@ fn some(count: usize, seed: u64, depth: f32, degree: usize) -> GaussianArrays {
 
 /// One after the other, at the higher of the two degrees.
 fn together(own: &GaussianArrays, still: &GaussianArrays) -> GaussianArrays {
-    light4gs_codec::take::drawn_together(own, &[], Some(still))
+    let part = SegmentPart { hidden: &[], moved: still, weight: 1.0 };
+    drawn_together(own, &[part])
 }
 
 fn radii(rendering: &Rendering) -> Vec<i32> {

@@ -104,7 +104,7 @@ fn scene(config: &Config, device: &Device) -> DynamicScene {
 fn config(overrides: &[&str]) -> Config {
     let small = ["model.hexplane.channels=4", "model.hexplane.resolution=[8,8,8,4]", "model.deformation.width=8"];
     let overrides: Vec<String> = small.iter().chain(overrides).map(|key| (*key).to_owned()).collect();
-    Config::load("dnerf-cpu", &overrides).unwrap()
+    Config::load("hexplane-dnerf-cpu", &overrides).unwrap()
 }
 
 /// Averaged over many draws, the estimate from a part of the planes is the rate of all planes.

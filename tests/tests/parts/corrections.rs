@@ -69,7 +69,7 @@ fn trained((data, images): (Scene, MemoryImages), keys: &[&str]) -> (f32, Option
         "train.corrections.from=50",
     ];
     let keys: Vec<String> = KEYS.iter().chain(keys).map(|key| (*key).to_owned()).collect();
-    let config = Config::load("dnerf-cpu", &keys).unwrap();
+    let config = Config::load("hexplane-dnerf-cpu", &keys).unwrap();
     let mut trainer = Trainer::builder(config, data).images(images).build().unwrap();
     let mut losses = Vec::new();
     while let Some(step) = trainer.step().unwrap() {

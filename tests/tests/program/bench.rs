@@ -12,7 +12,20 @@ fn bench_prints_a_table_and_json() {
     assert!(String::from_utf8_lossy(&output.stdout).contains("matmul"));
     let output = w.run(small.into_iter().chain(["--json", "--device", "flex"]));
     let json: serde_json::Value = serde_json::from_slice(&output.stdout).unwrap();
-    assert_eq!(json[0]["device"], "flex");
+    let timed = |part: &str| {
+        let rows = json["rows"].as_array().unwrap();
+        rows.iter()
+            .any(|row| row["part"] == part && row["milliseconds"].as_f64() > Some(0.0) && row["device"] == "flex")
+    };
+    assert!(timed("nodes, training step") && timed("1024×1024 matmul"), "{json}");
+    let command = json["command"].as_str().unwrap();
+    assert!(
+        command.ends_with("light4gs bench --gaussians 200 --size 40 --repeats 1 --json --device flex"),
+        "{command}"
+    );
+    for key in ["commit", "machine", "date"] {
+        assert!(!json[key].as_str().unwrap().is_empty(), "{key}");
+    }
 }
 
 #[test]
@@ -25,8 +38,8 @@ fn the_host_part_of_a_step_has_a_table_of_its_own() {
     assert!(text.contains("read-backs") && text.contains("nodes, step with noise and rate"), "{text}");
     let output = w.run(host.into_iter().chain(["--json"]));
     let json: serde_json::Value = serde_json::from_slice(&output.stdout).unwrap();
-    let step = &json[0]["timings"][0];
-    assert_eq!((&step["name"], &step["read_backs"]), (&"hexplane, training step".into(), &1.into()));
+    let step = &json["rows"][0];
+    assert_eq!((&step["part"], &step["read_backs"]), (&"hexplane, training step".into(), &1.into()));
     assert!(step["read_bytes"].as_u64().unwrap() > 0 && step["milliseconds"].as_f64().unwrap() > 0.0);
     assert_refused(&w.run(["bench", "--host", "--size", "40"]), &["--host", "--size"]);
 }
@@ -41,17 +54,14 @@ fn a_step_does_not_launch_more_kernels_than_before() {
     let output = w.run(small);
     assert_success(&output);
     let json: serde_json::Value = serde_json::from_slice(&output.stdout).unwrap();
-    let timings = json[0]["scenes"][0]["timings"].as_array().unwrap();
-    let row =
-        |part: &str| timings.iter().find(|timing| timing["name"] == part).unwrap_or_else(|| panic!("no row {part}"));
-    let launches = |part: &str| -> u64 {
-        row(part)["launches"].as_object().unwrap().values().map(|count| count.as_u64().unwrap()).sum()
-    };
+    let rows = json["rows"].as_array().unwrap();
+    let row = |part: &str| rows.iter().find(|row| row["part"] == part).unwrap_or_else(|| panic!("no row {part}"));
+    let launches = |part: &str| row(part)["launches"].as_u64().unwrap();
     // The loss with the number of intersections; with the rate also the positions, read beside the views.
     for (part, expected) in [("training step", 1), ("step with noise", 1), ("step with noise and rate", 2)] {
         assert_eq!(row(&format!("nodes, {part}"))["read_backs"], expected, "{part}");
     }
-    let adapter = json[0]["adapter"].as_str().unwrap();
+    let adapter = rows[0]["adapter"].as_str().unwrap();
     let more = if adapter.contains("llvmpipe") { 0 } else { 10 };
     for (part, bound) in [
         ("splat forward + backward", 28),

@@ -187,8 +187,8 @@ fn a_run_with_the_rate_in_its_loss_on_wgpu() {
 fn layers_on_top() {
     let w = Workspace::new(PROGRAM);
     let train = |config: &str| w.run(["train", "scene", "--quiet", "--config", config, "--out", "run"]);
-    assert_refused(&train("dnerf-cpu+nothing"), &["nothing"]);
-    assert_refused(&train("medium+dnerf-cpu"), &["dnerf-cpu", "extends"]);
+    assert_refused(&train("hexplane-dnerf-cpu+nothing"), &["nothing"]);
+    assert_refused(&train("medium+hexplane-dnerf-cpu"), &["hexplane-dnerf-cpu", "extends"]);
     assert!(w.names("run").is_empty());
 }
 
@@ -208,7 +208,7 @@ fn wishes_become_keys() {
     assert_success(&w.train("by-hand", &overrides).args(["--pixels", "16"]).output().unwrap());
     assert_eq!((key("by-hand", "resolution"), key("by-hand", "max_gaussians")), (16.0, 400.0));
 
-    let arguments = ["train", "scene", "--config", "dnerf-cpu+nodes", "--pixels", "16", "--minutes", "0.3"];
+    let arguments = ["train", "scene", "--config", "dnerf", "--pixels", "16", "--minutes", "0.3"];
     let output = w.command(arguments).args(["--set", "device=flex", "--out", "short"]).output().unwrap();
     assert_success(&output);
     let told = String::from_utf8_lossy(&output.stderr).into_owned();
@@ -222,7 +222,7 @@ fn wishes_become_keys() {
         (["--pixels", "7"], ["--pixels", "8"]),
         (["--minutes", "50000"], ["--minutes 50000", "between"]),
     ] {
-        let arguments = ["train", "scene", "--config", "dnerf-cpu+nodes", "--out", "never"];
+        let arguments = ["train", "scene", "--config", "dnerf", "--out", "never"];
         assert_refused(&w.command(arguments).args(wish).args(["--set", "device=flex"]).output().unwrap(), &words);
     }
     assert!(!w.path("never").exists());
@@ -372,7 +372,8 @@ fn an_empty_split() {
 #[test]
 fn an_unknown_key() {
     let w = Workspace::new(PROGRAM);
-    fs::write(w.path("mine.toml"), "extends = \"dnerf-cpu\"\n[train.densify.adaptive]\nintervall = 3\n").unwrap();
+    fs::write(w.path("mine.toml"), "extends = \"hexplane-dnerf-cpu\"\n[train.densify.adaptive]\nintervall = 3\n")
+        .unwrap();
     let output = w.run(["train", "scene", "--config", "mine.toml", "--out", "run"]);
     assert_refused(&output, &["mine.toml", "train.densify.adaptive.intervall", "train.densify.adaptive.interval"]);
     assert_refused(

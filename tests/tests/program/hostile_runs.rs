@@ -305,7 +305,7 @@ fn found_before() {
         let name = std::ffi::OsStr::from_bytes(b"sc\xffne");
         fs::rename(w.path("scene"), w.path("").join(name)).unwrap();
         let mut command = w.command(["train"]);
-        command.arg(name).args(["--config", "dnerf-cpu", "--out", "x"]);
+        command.arg(name).args(["--config", "hexplane-dnerf-cpu", "--out", "x"]);
         assert_refused(&command.output().unwrap(), &["Unicode"]);
         fs::rename(w.path("").join(name), w.path("scene")).unwrap();
     }

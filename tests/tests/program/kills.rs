@@ -174,7 +174,7 @@ fn starts_that_were_stopped_are_begun_again() {
     assert_success(&train(&w, "whole", &["--overwrite"]).output().unwrap());
     // A configuration that the user wrote must not be replaced.
     fs::create_dir(w.path("mine")).unwrap();
-    fs::write(w.path("mine/config.toml"), "extends = \"dnerf-cpu\"\n").unwrap();
+    fs::write(w.path("mine/config.toml"), "extends = \"hexplane-dnerf-cpu\"\n").unwrap();
     assert_refused(&train(&w, "mine", &["--overwrite"]).output().unwrap(), &["mine", "config.toml"]);
     assert_eq!(w.names("mine"), ["config.toml"]);
 }

@@ -19,7 +19,10 @@ fn filmed() -> Workspace {
 }
 
 fn train(w: &Workspace, run: &str, more: &[&str]) -> Command {
-    let mut command = w.command(["train", "rig", "--config", "dnerf-cpu", "--segment", "1", "--out", run, "--quiet"]);
+    let mut command = w.command(["train", "rig", "--config", "hexplane-dnerf-cpu", "--out", run, "--quiet"]);
+    if !more.contains(&"--segment") {
+        command.args(["--segment", "1"]);
+    }
     let keys =
         TINY.into_iter().chain(TINY_COMPRESSION).chain(["model.field=nodes", "data.resolution=0", "device=flex"]);
     for key in keys {
@@ -43,6 +46,7 @@ fn a_take_is_trained_in_parts_and_plays_as_one_file() {
     for pair in times.windows(2) {
         assert_eq!(pair[0].end, pair[1].begin);
         assert!(pair[0].stream_end > pair[0].end && pair[1].stream_begin < pair[1].begin);
+        assert_eq!(take.drawn_at(pair[1].begin).len(), 2, "a fade");
     }
     // Every segment is an ordinary stream, and the base stands still.
     for number in 0..3 {
@@ -142,6 +146,33 @@ fn what_is_filmed_later_is_added_and_the_rest_stays() {
     assert_refused(&w.command(["extend", "take", "rig"]).output().unwrap(), &["30 frames", "more frames"]);
 }
 
+/// The time that is wished is that of all parts, and the bytes are those of the file.
+#[test]
+fn wishes_are_for_the_take() {
+    let w = filmed();
+    assert_success(&train(&w, "small", &["--target-bytes", "40k"]).output().unwrap());
+    let bytes = fs::metadata(w.path("small/take.l4gs")).unwrap().len();
+    assert!((20_000..=40_000).contains(&bytes), "{bytes} bytes");
+    let error = train(&w, "none", &["--target-bytes", "1k"]).output().unwrap();
+    assert_refused(&error, &["target", "bytes"]);
+}
+
+#[test]
+fn no_segment_goes_beyond_a_cut() {
+    let w = Workspace::new(PROGRAM);
+    let options = ["--seconds", "4", "--cut", "1.25", "--fps", "10", "--width", "48", "--height", "36"];
+    assert_success(&w.command(["synth", "rig"]).args(options).output().unwrap());
+    assert_success(&train(&w, "take", &["--segment", "auto"]).output().unwrap());
+    let record: Value = serde_json::from_slice(&fs::read(w.path("take/take.json")).unwrap()).unwrap();
+    let segments: Vec<_> = record["plan"]["segments"].as_array().unwrap().iter().collect();
+    let begins: Vec<_> = segments.iter().map(|one| (one["first"].as_u64(), one["begins_at_cut"] == true)).collect();
+    assert_eq!(begins, [(Some(0), false), (Some(13), true)]);
+    let take = Take::read(fs::read(w.path("take/take.l4gs")).unwrap(), &Limits::default()).unwrap();
+    let drawn = |seconds: f64| take.drawn_at(seconds).iter().map(|one| one.segment).collect::<Vec<_>>();
+    // No fade at the cut.
+    assert_eq!([1.2, 1.24, 1.27, 1.3].map(drawn), [[0], [0], [1], [1]]);
+}
+
 #[test]
 fn what_is_no_take_is_refused_with_a_remedy() {
     let w = filmed();
@@ -150,9 +181,8 @@ fn what_is_no_take_is_refused_with_a_remedy() {
     assert_refused(&w.command(["join", "rig"]).output().unwrap(), &["take.json"]);
     let jobs = w.command(["train", "rig", "--out", "x", "--jobs", "2"]).output().unwrap();
     assert_refused(&jobs, &["--jobs", "--segment"]);
-    let target = train(&w, "x", &["--target-bytes", "100k"]).output().unwrap();
-    assert_refused(&target, &["--target-bytes", "--segment"]);
-    assert_refused(&train(&w, "x", &["--minutes", "1"]).output().unwrap(), &["--minutes", "--segment"]);
+    let refused = train(&w, "x", &["--minutes", "50000"]).output().unwrap();
+    assert_refused(&refused, &["--minutes 50000", "between"]);
     // A scene whose time is not known.
     assert_success(&w.command(["synth", "plain", "--resolution", "32", "--train-frames", "12"]).output().unwrap());
     let unknown = w.command(["train", "plain", "--segment", "1", "--out", "y", "--device", "flex"]).output().unwrap();

@@ -5,12 +5,12 @@
 mod description;
 mod unpacked;
 
-use light4gs_codec::take::{SegmentPlace, TakeIndex, drawn_together};
+use light4gs_codec::take::{DrawnSegment, SegmentPart, SegmentPlace, TakeIndex, drawn_together};
 use light4gs_codec::{CodecError, Decoded, Limits, OpenStream, SceneData, decode_with_limits};
 
 use self::unpacked::Unpacked;
 use crate::description::{Facts, describe};
-use crate::draw_list::{DrawList, Viewpoint};
+use crate::draw_list::{DrawList, Share, Viewpoint, WHOLE};
 use crate::gaussians::activated;
 use crate::levels::levels;
 use crate::limits::{limits, take_limits};
@@ -25,8 +25,8 @@ pub struct OpenTake {
     /// None before it has come.
     base: Option<Part>,
     segments: Vec<Segment>,
-    /// The segment of `segments` that is drawn.
-    shown: Option<usize>,
+    /// Those of `segments` that are drawn, with their weights: two around a join.
+    shown: Vec<(usize, f32)>,
     list: DrawList,
 }
 
@@ -41,7 +41,7 @@ struct Segment {
 impl OpenTake {
     /// A take of which nothing but the index is there.
     pub fn new(index: TakeIndex) -> Self {
-        Self { index, base: None, segments: Vec::new(), shown: None, list: DrawList::default() }
+        Self { index, base: None, segments: Vec::new(), shown: Vec::new(), list: DrawList::default() }
     }
 
     /// Takes the index of a take that may have grown: all that was there is still there, be it at another place of a file that was
@@ -105,51 +105,86 @@ impl OpenTake {
     /// Frees a segment.
     pub fn close_segment(&mut self, begin: f64) {
         self.segments.retain(|segment| segment.place.times.begin != begin);
-        self.shown = None;
+        self.shown.clear();
     }
 
-    /// Chooses what is drawn: the base, and the segment of a time in seconds where it is open; and the level of detail of
-    /// both. Returns whether something was chosen of which nothing is evaluated yet.
+    /// Chooses what is drawn: the base, and the segments of a time in seconds that are open; and the level of detail of all
+    /// of them. Returns whether something was chosen of which nothing is evaluated yet.
     pub fn show(&mut self, seconds: f64, level: u32) -> bool {
-        self.shown = self.segments.iter().position(|segment| segment.place.times.contains(seconds));
+        let before: Vec<usize> = self.shown.iter().map(|(number, _)| *number).collect();
+        self.shown = self.open_at(seconds);
         if let Some(base) = &mut self.base
             && base.show_level(level)
         {
             base.evaluate(0.0, 0, base.count());
         }
-        self.shown.is_some_and(|shown| self.segments[shown].part.show_level(level))
+        let mut new = false;
+        for &(number, _) in &self.shown {
+            new |= self.segments[number].part.show_level(level) || !before.contains(&number);
+        }
+        new
     }
 
-    /// Number of Gaussians that [`OpenTake::evaluate`] moves: those of the segment, since the base stands still.
+    /// The open ones of the segments that are drawn at a time, with their weights. One that is not open leaves its share to the
+    /// other.
+    fn open_at(&self, seconds: f64) -> Vec<(usize, f32)> {
+        let drawn = self.index.drawn_at(seconds).into_iter();
+        let mut open: Vec<_> = drawn
+            .filter_map(|DrawnSegment { segment, weight }| {
+                let begin = self.index.segments()[segment].times.begin;
+                let number = self.segments.iter().position(|open| open.place.times.begin == begin)?;
+                Some((number, weight))
+            })
+            .collect();
+        if let [(_, weight)] = &mut open[..] {
+            *weight = 1.0;
+        }
+        open
+    }
+
+    /// Number of Gaussians that [`OpenTake::evaluate`] moves: those of the segments, since the base stands still.
     pub fn count(&self) -> usize {
-        self.shown.map_or(0, |shown| self.segments[shown].part.count())
+        self.shown.iter().map(|(number, _)| self.segments[*number].part.count()).sum()
     }
 
-    /// Computes the Gaussians `first` to `last` of the segment at a time in seconds.
+    /// Computes the Gaussians `first` to `last` of the segments, one after the other, at a time in seconds.
     pub fn evaluate(&mut self, seconds: f64, first: usize, last: usize) {
-        if let Some(shown) = self.shown {
-            let Segment { place, part, .. } = &mut self.segments[shown];
-            part.evaluate(place.times.stream_time(seconds), first, last);
+        let mut begin = 0;
+        for (number, _) in &self.shown {
+            let Segment { place, part, .. } = &mut self.segments[*number];
+            let count = part.count();
+            let within = |index: usize| index.saturating_sub(begin).min(count);
+            let (first, last) = (within(first), within(last));
+            if first < last {
+                part.evaluate(place.times.stream_time(seconds), first, last);
+            }
+            begin += count;
         }
     }
 
-    /// Base and segment as computed last, back to front, [`ENTRY`](crate::ENTRY) numbers each.
+    /// Base and segments as computed last, back to front, [`ENTRY`](crate::ENTRY) numbers each.
     pub fn draw_list(&mut self, viewpoint: &Viewpoint) -> &[f32] {
-        let segment = self.shown.map(|shown| &self.segments[shown]);
-        let hidden = segment.map_or(&[][..], |segment| &segment.hidden);
-        let base = self.base.iter().map(|base| base.drawn(hidden));
-        let parts: Vec<_> = base.chain(segment.map(|segment| segment.part.drawn(&[]))).collect();
+        let shares: Vec<Share<'_>> =
+            self.shown.iter().map(|&(number, weight)| (&self.segments[number].hidden[..], weight)).collect();
+        let own: Vec<[Share<'_>; 1]> = self.shown.iter().map(|&(_, weight)| [(&[][..], weight)]).collect();
+        let base = self.base.iter().map(|base| base.drawn(if shares.is_empty() { WHOLE } else { &shares }));
+        let segments = self.shown.iter().zip(&own).map(|((number, _), own)| self.segments[*number].part.drawn(own));
+        let parts: Vec<_> = base.chain(segments).collect();
         self.list.make(&parts, viewpoint)
     }
 
-    /// The attributes of base and segment at a time in seconds, as of [`OpenScene::attributes_at`](crate::OpenScene::attributes_at),
+    /// The attributes of base and segments at a time in seconds, as of [`OpenScene::attributes_at`](crate::OpenScene::attributes_at),
     /// and the degree of the harmonics.
     pub fn attributes_at(&self, seconds: f64) -> (Vec<f32>, u8) {
-        let segment = self.segments.iter().find(|segment| segment.place.times.contains(seconds));
-        let moved = segment.map(|segment| segment.part.moved_at(segment.place.times.stream_time(seconds)));
+        let open = self.open_at(seconds).into_iter().map(|(number, weight)| {
+            let Segment { place, part, hidden } = &self.segments[number];
+            (hidden, part.moved_at(place.times.stream_time(seconds)), weight)
+        });
+        let open: Vec<_> = open.collect();
+        let parts = open.iter().map(|(hidden, moved, weight)| SegmentPart { hidden, moved, weight: *weight });
         let nothing = SceneData::default().gaussians;
         let base = self.base.as_ref().map_or(&nothing, Part::canonical);
-        let drawn = drawn_together(base, segment.map_or(&[], |segment| &segment.hidden), moved.as_ref());
+        let drawn = drawn_together(base, &parts.collect::<Vec<_>>());
         (activated(&drawn), drawn.sh_degree)
     }
 

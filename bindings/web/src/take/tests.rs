@@ -74,6 +74,30 @@ fn each_time_has_its_segment_and_what_it_hides() {
 }
 
 #[test]
+fn around_a_join_both_segments_are_drawn() {
+    let segments = [segment(0.0, balls(&[4.0]), vec![true, false]), segment(1.0, balls(&[6.0, 3.0]), Vec::new())];
+    let bytes = write_take(&TakeMeta::default(), &balls(&[5.0, 2.0]), &segments, 2).expect("a take");
+    let file = (Take::read(bytes.clone(), &take_limits()).expect("a take"), bytes);
+    let mut open = opened(&file, &[0, 1]);
+    assert_eq!(depths(&mut open, 0.5), [4.0, 2.0]);
+    assert_eq!(depths(&mut open, 1.0), [6.0, 5.0, 4.0, 3.0, 2.0]);
+    assert_eq!(open.count(), 3);
+    // The opacities of the list are those of all attributes.
+    let opacities = |numbers: &[f32], count: usize| numbers[10 * count..11 * count].to_vec();
+    let (numbers, _) = open.attributes_at(1.0);
+    let viewpoint = Viewpoint { row: [0.0, 0.0, 1.0, 0.0], eye: [0.0; 3], spread: f32::INFINITY };
+    let drawn: Vec<f32> = open.draw_list(&viewpoint).chunks_exact(ENTRY).map(|entry| entry[3]).take(5).collect();
+    // Depths 5, 2 of the base, 4, 6, 3 of the segments.
+    let by_depth = [3, 0, 2, 4, 1].map(|index| opacities(&numbers, 5)[index]);
+    assert!(drawn.iter().zip(by_depth).all(|(drawn, all)| (drawn - all).abs() < 1e-6), "{drawn:?}, {by_depth:?}");
+    assert!(drawn[0] < drawn[4] && (drawn[1] - drawn[0]).abs() < 1e-6);
+    // One that has not come yet leaves its share to the other.
+    open.close_segment(1.0);
+    assert_eq!(depths(&mut open, 1.0), [4.0, 2.0]);
+    assert_eq!(open.attributes_at(1.0).0.len(), 2 * 14);
+}
+
+#[test]
 fn a_segment_stays_where_the_take_grows_and_another_take_is_not_taken() {
     let file = take();
     let mut open = opened(&file, &[1]);

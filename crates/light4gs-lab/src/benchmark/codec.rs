@@ -17,13 +17,15 @@ use light4gs_train::table::{Align, Table};
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use rayon::ThreadPoolBuilder;
-use serde::Serialize;
+use serde_json::json;
+
+use crate::record::Row;
 
 /// Gaussians of the scene: the number that the paper keeps of *bouncing balls*.
 const GAUSSIANS: usize = 12_000;
 
 /// Best time of one part.
-#[derive(Clone, Debug, Serialize)]
+#[derive(Clone, Debug)]
 pub struct CoderTime {
     /// Its name.
     pub part: &'static str,
@@ -64,7 +66,7 @@ fn scene(config: &Config, device: &Device) -> DynamicScene {
 /// [`TrainError::Input`] if this build has no back end.
 pub fn codec_benchmark(repeats: usize) -> Result<Vec<CoderTime>, TrainError> {
     let device = light4gs_train::device::any()?;
-    let config = Config::from_preset("dnerf")?;
+    let config = Config::from_preset("hexplane-dnerf")?;
     let scene = scene(&config, &device);
     let mut compression = Compression::new(&ConfiguredModels, &config, scene.planes(), &device)?;
     compression.start_from(scene.planes());
@@ -114,6 +116,20 @@ pub fn codec_benchmark(repeats: usize) -> Result<Vec<CoderTime>, TrainError> {
     add("encode a scene, checked", all, &|| drop(encode_compressed(&data, &input).unwrap()));
     add("decode a scene", all, &|| drop(light4gs_codec::decode(&encoded.bytes).unwrap()));
     Ok(times)
+}
+
+/// A row for each coder.
+pub fn codec_rows(times: &[CoderTime]) -> Vec<Row> {
+    let of_coder = |time: &CoderTime| {
+        let row = json!({
+            "part": time.part,
+            "symbols": time.symbols,
+            "milliseconds": time.milliseconds,
+            "milliseconds_one_thread": time.milliseconds_one_thread,
+        });
+        row.as_object().cloned()
+    };
+    times.iter().filter_map(of_coder).collect()
 }
 
 /// One row for each coder.

@@ -6,11 +6,11 @@ use light4gs_train::config::DeviceName;
 use light4gs_train::device::adapter_name;
 use light4gs_train::error::TrainError;
 use light4gs_train::table::{Align, Table};
-use serde::Serialize;
 
 use super::launches::Launches;
 use super::steps::FIELDS;
-use super::{BenchScene, Meter, Timing};
+use super::{BenchScene, Meter, Timing, timing_rows};
+use crate::record::Row;
 
 /// Gaussians of the scene.
 const GAUSSIANS: usize = 100;
@@ -18,7 +18,7 @@ const GAUSSIANS: usize = 100;
 const SIDE: u32 = 32;
 
 /// The steps on one device.
-#[derive(Clone, Debug, Serialize)]
+#[derive(Clone, Debug)]
 pub struct HostTimes {
     /// Name of the back end.
     pub device: String,
@@ -40,6 +40,12 @@ pub fn host_benchmark(name: DeviceName, device: &Device, repeats: usize) -> Resu
         timings.extend(field.steps(&scene, &meter)?);
     }
     Ok(HostTimes { device: name.to_string(), adapter: adapter_name(name, device), timings })
+}
+
+/// A row for each device and step.
+pub fn host_rows(results: &[HostTimes]) -> Vec<Row> {
+    let of_device = |times: &HostTimes| timing_rows(&times.device, times.adapter.as_deref(), None, &times.timings);
+    results.iter().flat_map(of_device).collect()
 }
 
 /// One table: a row for each device and step.

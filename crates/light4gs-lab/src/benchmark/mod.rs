@@ -21,11 +21,14 @@ use light4gs_train::table::{Align, Table};
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use safetensors::{Dtype, SafeTensors};
-use serde::Serialize;
+use serde_json::json;
 
 use self::launches::Launches;
 use self::steps::FIELDS;
+use crate::record::Row;
 
+/// The part that is timed once a device.
+const CALIBRATION_PART: &str = "1024×1024 matmul";
 /// Untimed repetitions before the timed ones.
 const WARM_UP: usize = 2;
 /// Nodes that the Gaussians follow in the rows on skinning.
@@ -171,22 +174,20 @@ impl BenchScene {
 }
 
 /// One part.
-#[derive(Clone, Debug, Serialize)]
+#[derive(Clone, Debug)]
 pub struct Timing {
     /// Its name.
     pub name: String,
     /// Its cost.
-    #[serde(flatten)]
     pub cost: Cost,
 }
 
 /// The cost of a part.
-#[derive(Clone, Debug, Serialize)]
+#[derive(Clone, Debug)]
 pub struct Cost {
     /// Median over the repetitions.
     pub milliseconds: f64,
     /// Kernel launches of one repetition, by the kernel's name; empty on devices that launch none.
-    #[serde(skip_serializing_if = "BTreeMap::is_empty")]
     pub launches: BTreeMap<String, u64>,
     /// Times that the host read from the device in one repetition: it waits for each.
     pub read_backs: u64,
@@ -195,7 +196,7 @@ pub struct Cost {
 }
 
 /// All parts on one scene.
-#[derive(Clone, Debug, Serialize)]
+#[derive(Clone, Debug)]
 pub struct SceneTimes {
     /// Name of the scene.
     pub scene: String,
@@ -204,7 +205,7 @@ pub struct SceneTimes {
 }
 
 /// All scenes on one device.
-#[derive(Clone, Debug, Serialize)]
+#[derive(Clone, Debug)]
 pub struct DeviceTimes {
     /// Name of the back end.
     pub device: String,
@@ -360,6 +361,40 @@ fn timings(scene: &BenchScene, meter: &Meter, autodiff: &Device) -> Result<Vec<T
     Ok(out)
 }
 
+/// A row for each device, scene and part; the calibration product has no scene.
+pub fn rows(results: &[DeviceTimes]) -> Vec<Row> {
+    let of_device = |times: &DeviceTimes| {
+        let (device, adapter) = (&times.device, &times.adapter);
+        let calibration = json!({
+            "device": device, "adapter": adapter, "part": CALIBRATION_PART, "milliseconds": times.calibration_ms,
+        });
+        let of_scene = |scene: &SceneTimes| timing_rows(device, adapter.as_deref(), Some(&scene.scene), &scene.timings);
+        let mut rows: Vec<Row> = times.scenes.iter().flat_map(of_scene).collect();
+        rows.extend(calibration.as_object().cloned());
+        rows
+    };
+    results.iter().flat_map(of_device).collect()
+}
+
+/// A row for each part on one device.
+fn timing_rows(device: &str, adapter: Option<&str>, scene: Option<&str>, timings: &[Timing]) -> Vec<Row> {
+    let of_part = |Timing { name, cost }: &Timing| {
+        let row = json!({
+            "device": device,
+            "adapter": adapter,
+            "scene": scene,
+            "part": name,
+            "milliseconds": cost.milliseconds,
+            "launches": cost.launches.values().sum::<u64>(),
+            "kernels": cost.launches,
+            "read_backs": cost.read_backs,
+            "read_bytes": cost.read_bytes,
+        });
+        row.as_object().cloned()
+    };
+    timings.iter().filter_map(of_part).collect()
+}
+
 /// One table: a row for each part, a column for each device and scene.
 pub fn table(results: &[DeviceTimes]) -> String {
     let mut columns = vec![("ms (median)".to_owned(), Align::Left)];
@@ -387,7 +422,7 @@ pub fn table(results: &[DeviceTimes]) -> String {
         table.row(cells(&field.row("training it/s"), &timing_of(field.row("training step"))));
         table.row(cells(&field.row("render FPS"), &timing_of(field.row("render"))));
     }
-    table.rule().row(cells("1024×1024 matmul", &|device, _| device.calibration_ms));
+    table.rule().row(cells(CALIBRATION_PART, &|device, _| device.calibration_ms));
     let launches = launch_table(results).unwrap_or_default();
     let adapters = results.iter().filter_map(|device| Some((&device.device, device.adapter.as_ref()?)));
     adapters.fold(table.to_string() + &launches, |text, (device, adapter)| format!("{text}\n{device}: {adapter}"))

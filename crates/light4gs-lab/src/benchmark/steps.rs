@@ -20,9 +20,9 @@ use super::{BenchScene, Cost, Meter, Timing};
 
 /// The fields, each with the preset whose steps are timed and the changes to it.
 pub(super) const FIELDS: [TimedField; 3] = [
-    TimedField { name: "hexplane", preset: "dnerf-cpu", keys: &[] },
-    TimedField { name: "nodes", preset: "dnerf-cpu+nodes+medium", keys: &[] },
-    TimedField { name: "still", preset: "dnerf-cpu", keys: &["model.field=still"] },
+    TimedField { name: "hexplane", preset: "hexplane-dnerf-cpu", keys: &[] },
+    TimedField { name: "nodes", preset: "dnerf+medium", keys: &[] },
+    TimedField { name: "still", preset: "hexplane-dnerf-cpu", keys: &["model.field=still"] },
 ];
 
 /// Frames that are trained on, each at a time of its own.

@@ -36,7 +36,7 @@ use super::measure::{Column, Measure, default_columns};
 const MOST_VARIANTS: usize = 10_000;
 
 /// The preset that variants start from, where neither the command nor a value names one.
-pub const DEFAULT_CONFIG: &str = "dnerf-cpu";
+pub const DEFAULT_CONFIG: &str = "hexplane-dnerf-cpu";
 
 /// Legal factors of the length of a schedule.
 pub const SCHEDULES: RangeInclusive<f64> = 0.001..=1000.0;

@@ -28,6 +28,9 @@ const MAX_BYTES: u64 = 1 << 28;
 pub struct Manifest {
     /// Version of the program that planned it.
     pub version: String,
+    /// The command that planned it; empty where it is not known.
+    #[serde(default)]
+    pub command: String,
     /// The definition of the study.
     pub study: Study,
     /// Name and absolute path of every dataset.
@@ -90,6 +93,7 @@ impl Manifest {
             |scene: &super::plan::StudyScene| ManifestScene { name: scene.name.clone(), path: scene.path.clone() };
         Self {
             version: env!("CARGO_PKG_VERSION").to_owned(),
+            command: plan.command.clone(),
             study: plan.study.clone(),
             scenes: plan.scenes.iter().map(scene).collect(),
             seeds: plan.seeds,

@@ -10,7 +10,7 @@
 //! - [`measure`]: the measures of a run, and the columns of tables
 //! - [`results`]: the results of the runs so far, `results.json` and the CSV files; [`reuse`]: trainings of other
 //!   studies; [`remaining`]: the time that missing runs will take
-//! - [`table`]: means, spreads and differences to the reference
+//! - [`table`]: means, spreads and differences to the reference; [`rows`]: the same as a record, for pages
 //! - [`quality_curves`]: runs as curves of quality over bytes or minutes
 //! - `plots`, `figures`: plots and images, and the study's `report.html`
 //! - [`curve`]: convex hulls and Bjøntegaard's differences; [`spread`]: mean and spread over seeds
@@ -27,6 +27,7 @@ pub mod quality_curves;
 pub mod remaining;
 pub mod results;
 pub mod reuse;
+pub mod rows;
 pub mod selection;
 pub mod spread;
 pub mod table;

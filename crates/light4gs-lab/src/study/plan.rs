@@ -27,6 +27,8 @@ pub struct PlanOptions {
     pub seeds: u64,
     /// Folders of other studies, whose trainings are reused.
     pub reuse: Vec<PathBuf>,
+    /// The command that asks for the study, for its record; empty if there is none.
+    pub command: String,
 }
 
 /// One combination of the axes' values.
@@ -81,6 +83,8 @@ pub struct Plan {
     pub runs: Vec<PlannedRun>,
     /// Absolute paths of other studies, whose trainings are reused.
     pub reuse: Vec<PathBuf>,
+    /// The command that asks for the study, for its record.
+    pub command: String,
 }
 
 impl Plan {
@@ -123,7 +127,8 @@ impl Plan {
         }
         let absolute = |path: &PathBuf| std::fs::canonicalize(path).map_err(DataError::io("read", path));
         let reuse = options.reuse.iter().map(absolute).collect::<Result<Vec<_>, _>>()?;
-        Ok(Self { study, variants, scenes, seeds: options.seeds, runs, reuse })
+        let command = options.command.clone();
+        Ok(Self { study, variants, scenes, seeds: options.seeds, runs, reuse, command })
     }
 
     /// Number of tasks.
@@ -252,12 +257,13 @@ value = [{ name = "three", label = "degree 3" }, { name = "one", set = ["model.s
 
     fn options(scene: &Path) -> PlanOptions {
         PlanOptions {
-            config: Some("dnerf-cpu".into()),
+            config: Some("hexplane-dnerf-cpu".into()),
             scenes: vec![scene.into()],
             schedule: None,
             overrides: Vec::new(),
             seeds: 1,
             reuse: Vec::new(),
+            command: String::new(),
         }
     }
 
@@ -292,7 +298,7 @@ value = [{ name = "three", label = "degree 3" }, { name = "one", set = ["model.s
         let overrides = vec!["train.coarse_iterations=7".to_owned()];
         let options = PlanOptions { schedule: Some(0.1), overrides, ..options(&scene) };
         let plan = Plan::new(study(&axes), &options).unwrap();
-        let usual = Config::load("dnerf-cpu", &[]).unwrap().train.fine_iterations;
+        let usual = Config::load("hexplane-dnerf-cpu", &[]).unwrap().train.fine_iterations;
         let fine = |run: usize| plan.runs[run].config.train.fine_iterations;
         assert_eq!([fine(0), fine(2)], [usual / 10, usual / 20]);
         assert!(plan.runs.iter().all(|run| run.config.train.coarse_iterations == 7));
@@ -320,7 +326,11 @@ value = [{ name = "three", label = "degree 3" }, { name = "one", set = ["model.s
         refused(wrong, good.clone(), &["strong", "compression.rate.lambda", "must be 0 to"]);
         refused(study(&LAMBDAS.replace("rate.lambda=0.05", "rate.lamda=0.05")), good.clone(), &["strong", "lambda"]);
         refused(study(&format!("reference = \"weak\"\n{LAMBDAS}")), good.clone(), &["weak", "one of none"]);
-        refused(study(LAMBDAS), PlanOptions { config: Some("dnerf-{scene}".into()), ..good }, &["dnerf-scene"]);
+        refused(
+            study(LAMBDAS),
+            PlanOptions { config: Some("hexplane-dnerf-{scene}".into()), ..good },
+            &["dnerf-scene"],
+        );
     }
 
     #[test]
@@ -329,7 +339,7 @@ value = [{ name = "three", label = "degree 3" }, { name = "one", set = ["model.s
         let scene = folder.path().join("flag");
         std::fs::create_dir(&scene).unwrap();
         for name in super::super::catalog::NAMES {
-            for config in [Some("dnerf-{scene}-cpu"), Some("dnerf-{scene}"), None] {
+            for config in [Some("hexplane-dnerf-{scene}-cpu"), Some("hexplane-dnerf-{scene}"), None] {
                 let options = PlanOptions { config: config.map(str::to_owned), ..options(&scene) };
                 let plan = Plan::new(Study::load(name).unwrap(), &options).unwrap_or_else(|e| panic!("{name}: {e}"));
                 assert!(!plan.runs.is_empty(), "{name}");

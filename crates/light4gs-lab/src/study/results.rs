@@ -10,7 +10,7 @@ use light4gs_train::compression::CodingRecord;
 use light4gs_train::config::Config;
 use light4gs_train::error::TrainError;
 use light4gs_train::observers::metrics_log::{MetricsRecord, read_metrics};
-use light4gs_train::run::RunFolder;
+use light4gs_train::run::{RunFolder, RunRecord};
 use serde::{Deserialize, Serialize};
 
 use super::manifest::{Manifest, ManifestRun, StudyFolder};
@@ -66,6 +66,29 @@ pub struct RunResult {
     /// The device on which it was measured.
     #[serde(skip)]
     pub device: String,
+    /// The record of its training.
+    #[serde(skip)]
+    pub trained: Training,
+}
+
+/// Where and when a run was trained.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Training {
+    /// Commit of the program.
+    pub commit: String,
+    /// Processor and cores.
+    pub machine: String,
+    /// When it began, UTC.
+    pub begun: String,
+}
+
+impl From<RunRecord> for Training {
+    fn from(record: RunRecord) -> Self {
+        match record.trained_by {
+            Some(other) => (*other).into(),
+            None => Self { commit: record.commit, machine: record.machine, begun: record.begun },
+        }
+    }
 }
 
 /// The figures of a split's quality that studies show; `None` if they were not measured.
@@ -165,7 +188,7 @@ impl Results {
                 results.missing.push(missing(folder, run));
                 continue;
             }
-            let (run_folder, _, config) = RunFolder::open(&path)?;
+            let (run_folder, record, config) = RunFolder::open(&path)?;
             if config.digest_text() != run.configuration {
                 let state = "has another configuration than the study planned".to_owned();
                 let (run, task) = (run.name.clone(), run.task);
@@ -178,7 +201,8 @@ impl Results {
             let frames = light4gs_codec::read_info_with_limits(&run_folder.stream(), &light4gs_codec::Limits::large())
                 .ok()
                 .map(|info| info.meta.frame_count);
-            results.runs.push(result(run, &config, evaluation, frames.filter(|count| *count > 0)));
+            let frames = frames.filter(|count| *count > 0);
+            results.runs.push(result(run, &config, evaluation, frames, record.into()));
         }
         Ok(results)
     }
@@ -224,7 +248,13 @@ fn line(cells: Vec<String>) -> String {
     text
 }
 
-fn result(run: &ManifestRun, config: &Config, evaluation: EvaluationFile, frames: Option<u32>) -> RunResult {
+fn result(
+    run: &ManifestRun,
+    config: &Config,
+    evaluation: EvaluationFile,
+    frames: Option<u32>,
+    trained: Training,
+) -> RunResult {
     let split = |name: &str| evaluation.splits.iter().find(|split| split.split == name);
     let shown = split("test").or(evaluation.splits.first());
     let coding = evaluation.coding.as_ref();
@@ -249,6 +279,7 @@ fn result(run: &ManifestRun, config: &Config, evaluation: EvaluationFile, frames
         decode_seconds: evaluation.decode_seconds,
         fps: evaluation.fps.unwrap_or(f64::NAN),
         device: evaluation.device,
+        trained,
     }
 }
 

@@ -91,8 +91,7 @@ pub fn tables(manifest: &Manifest, results: &Results) -> Vec<StudyTable> {
 fn table(manifest: &Manifest, results: &Results, heading: &str, scenes: &[usize]) -> StudyTable {
     let study = &manifest.study;
     let variants = manifest.variants();
-    let reference = study.reference.as_ref().and_then(|name| variants.iter().position(|variant| variant.name == *name));
-    let reference = reference.unwrap_or(0);
+    let reference = reference(manifest);
     let of = |variant: usize, measure: Measure| by_seed(manifest, results, scenes, variant, measure);
     // Most datasets have no masks, and most machines no weights of LPIPS.
     let is_measured =
@@ -125,6 +124,12 @@ fn table(manifest: &Manifest, results: &Results, heading: &str, scenes: &[usize]
     }
 }
 
+/// Index of the variant to which differences are.
+fn reference(manifest: &Manifest) -> usize {
+    let named = manifest.study.reference.as_ref();
+    named.and_then(|name| manifest.variants().iter().position(|variant| variant.name == *name)).unwrap_or(0)
+}
+
 /// The values of a measure by seed, each the mean over the scenes; `None` for seeds that lack a scene.
 fn by_seed(
     manifest: &Manifest,
@@ -152,6 +157,23 @@ pub(super) fn over_seeds(
     spread_of(by_seed(manifest, results, scenes, variant, measure).into_iter())
 }
 
+/// A column of a variant over the seeds that have all scenes; no difference of the reference to itself.
+pub(super) fn column_over_seeds(
+    manifest: &Manifest,
+    results: &Results,
+    scenes: &[usize],
+    variant: usize,
+    column: &Column,
+) -> Option<Spread> {
+    let of = |variant| by_seed(manifest, results, scenes, variant, column.measure);
+    let reference = reference(manifest);
+    match column.form {
+        Form::Value => spread_of(of(variant).into_iter()),
+        _ if variant == reference => None,
+        form => differences(&of(variant), &of(reference), form),
+    }
+}
+
 fn spread_of(values: impl Iterator<Item = Option<f64>>) -> Option<Spread> {
     let values: Vec<f64> = values.flatten().collect();
     (!values.is_empty()).then(|| Spread::of(&values))
@@ -164,17 +186,21 @@ fn value_cell(by_seed: &[Option<f64>], column: &Column) -> Option<Cell> {
 }
 
 /// Runs of the same seed begin alike and see the same frames in the same order, so they are compared with each other.
+fn differences(own: &[Option<f64>], reference: &[Option<f64>], form: Form) -> Option<Spread> {
+    let differences = own.iter().zip(reference).map(|(own, reference)| {
+        let (own, reference) = ((*own)?, (*reference)?);
+        match form {
+            Form::Percent => (reference != 0.0).then(|| 100.0 * (own / reference - 1.0)),
+            _ => Some(own - reference),
+        }
+    });
+    spread_of(differences)
+}
+
 fn difference_cell(own: &[Option<f64>], reference: &[Option<f64>], column: &Column) -> Option<Cell> {
     let percent = column.form == Form::Percent;
     let digits = if percent { 1.max(column.measure.digits()) } else { column.measure.digits() };
-    let differences = own.iter().zip(reference).map(|(own, reference)| {
-        let (own, reference) = ((*own)?, (*reference)?);
-        match percent {
-            true => (reference != 0.0).then(|| 100.0 * (own / reference - 1.0)),
-            false => Some(own - reference),
-        }
-    });
-    let spread = spread_of(differences)?;
+    let spread = differences(own, reference, column.form)?;
     let within_spread = spread.is_within_deviation();
     let mark = if within_spread == Some(true) { format!(" {WITHIN_SPREAD}") } else { String::new() };
     // Zero has no sign.
@@ -333,7 +359,7 @@ pub fn legend(manifest: &Manifest) -> String {
 pub(super) mod tests {
     use super::super::manifest::{ManifestRun, ManifestScene};
     use super::super::quality_curves::quality_curves;
-    use super::super::results::{MissingRun, Quality, RunResult};
+    use super::super::results::{MissingRun, Quality, RunResult, Training};
     use super::super::{Manifest, Study};
     use super::*;
 
@@ -364,8 +390,15 @@ bytes = 2.2e6
         let study = Study::from_toml(text, "example").unwrap();
         let scenes: Vec<_> =
             scenes.iter().map(|name| ManifestScene { name: (*name).to_owned(), path: "/".into() }).collect();
-        let mut manifest =
-            Manifest { version: String::new(), study, scenes, seeds, runs: Vec::new(), reuse: Vec::new() };
+        let mut manifest = Manifest {
+            version: String::new(),
+            command: "light4gs study example".to_owned(),
+            study,
+            scenes,
+            seeds,
+            runs: Vec::new(),
+            reuse: Vec::new(),
+        };
         let mut results = Results { runs: Vec::new(), missing: Vec::new() };
         for scene in 0..manifest.scenes.len() {
             for seed in 0..seeds {
@@ -412,6 +445,7 @@ bytes = 2.2e6
             decode_seconds: 0.0,
             fps: 1.0,
             device: String::new(),
+            trained: Training::default(),
         }
     }
 

@@ -7,7 +7,7 @@ use std::sync::{Arc, Mutex, PoisonError};
 
 use light4gs_codec::{
     CodecError, GaussianArrays, Limits,
-    take::{SegmentTimes, Take, TakeSegment, drawn_together},
+    take::{DrawnSegment, SegmentPart, SegmentTimes, Take, TakeSegment, drawn_together},
 };
 use light4gs_data::Camera;
 
@@ -15,6 +15,8 @@ use crate::playable::PlayableScene;
 
 /// Segments that are kept decoded unless a program asks for another number: the one that is shown, and those beside it.
 const KEPT: usize = 3;
+/// Around a join two of them are drawn.
+const LEAST_KEPT: usize = 2;
 
 /// A take: minutes that can be computed and drawn at any time.
 ///
@@ -80,9 +82,9 @@ impl PlayableTake {
         Self::new(Take::open(path, limits)?, limits)
     }
 
-    /// The same, with another number of segments that are kept decoded; at least one is.
+    /// The same, with another number of segments that are kept decoded; at least two are, as two are drawn around a join.
     pub fn keeping(self, most: usize) -> Self {
-        Self { most: most.max(1), ..self }
+        Self { most: most.max(LEAST_KEPT), ..self }
     }
 
     /// The file: its metadata, and when its segments are shown.
@@ -101,23 +103,23 @@ impl PlayableTake {
         decoded.iter().map(|(number, _)| *number).collect()
     }
 
-    /// Decodes the segment that is shown at a time in seconds, so that it is there when it is needed: for a thread that runs
-    /// ahead of the player. Nothing happens where no segment is shown.
+    /// Decodes the segments that are drawn at a time in seconds, so that they are there when they are needed: for a thread that
+    /// runs ahead of the player. Nothing happens where none is.
     ///
     /// # Errors
     /// As [`PlayableTake::at`].
     pub fn prepare(&self, seconds: f64) -> Result<(), CodecError> {
-        self.segment_at(seconds).map(|_| ())
+        self.drawn_at(seconds).map(|_| ())
     }
 
     /// The Gaussians at a time of the take in seconds, before their activations: those of the base that are not hidden, then
-    /// those of the segment, as [`drawn_together`] puts them; those of the base alone where no segment is shown. To the bit the
-    /// same on every machine. Takes one thread, and more to decode a segment.
+    /// those of the segment, or of two around a join, as [`drawn_together`] puts them; those of the base alone where no segment is
+    /// shown. To the bit the same on every machine. Takes one thread, and more to decode a segment.
     ///
     /// # Errors
     /// A time that is NaN or infinite; a segment that is damaged; what the system refuses.
     pub fn at(&self, seconds: f64) -> Result<GaussianArrays, CodecError> {
-        self.gaussians(seconds, self.segment_at(seconds)?.as_deref())
+        self.gaussians(seconds, &self.drawn_at(seconds)?)
     }
 
     /// An image `[height, width, 3]` of the take at a time in seconds: red, green, blue over the background, 0 or more and not
@@ -126,27 +128,32 @@ impl PlayableTake {
     /// # Errors
     /// As [`PlayableTake::at`]; for the size of the image and its memory as [`PlayableScene::render`].
     pub fn render(&self, camera: &Camera, seconds: f64, background: [f32; 3]) -> Result<Vec<f32>, CodecError> {
-        let shown = self.segment_at(seconds)?;
-        let (mut allowance, mut count, mut numbers) = (self.base.allowance(), self.base.len(), self.base.numbers());
-        if let Some(shown) = &shown {
+        let drawn = self.drawn_at(seconds)?;
+        let (mut allowance, mut count) = (self.base.allowance(), self.base.len());
+        // Harmonics are padded to the largest degree: at most as many as the widest would have for all.
+        let width = |scene: &PlayableScene| scene.numbers().div_ceil(scene.len().max(1));
+        let mut widest = width(&self.base);
+        for (shown, _) in &drawn {
             allowance = allowance.max(shown.scene.allowance());
             count += shown.scene.len();
-            // Harmonics are padded to the larger degree: at most as many as the wider of the two would have for all.
-            let width = |scene: &PlayableScene| scene.numbers().div_ceil(scene.len().max(1));
-            numbers = count * width(&self.base).max(width(&shown.scene));
+            widest = widest.max(width(&shown.scene));
         }
-        allowance.image(camera, background, (count, numbers), || self.gaussians(seconds, shown.as_deref()))
+        allowance.image(camera, background, (count, count * widest), || self.gaussians(seconds, &drawn))
     }
 
-    fn gaussians(&self, seconds: f64, shown: Option<&Shown>) -> Result<GaussianArrays, CodecError> {
-        let base = self.base.canonical();
-        let Some(Shown { times, scene, hidden }) = shown else { return Ok(drawn_together(base, &[], None)) };
-        let moved = scene.at(times.stream_time(seconds))?;
-        Ok(drawn_together(base, hidden, Some(&moved)))
+    fn gaussians(&self, seconds: f64, drawn: &[(Arc<Shown>, f32)]) -> Result<GaussianArrays, CodecError> {
+        let moved = drawn.iter().map(|(shown, _)| shown.scene.at(shown.times.stream_time(seconds)));
+        let moved = moved.collect::<Result<Vec<_>, _>>()?;
+        let parts = drawn.iter().zip(&moved).map(|((shown, weight), moved)| SegmentPart {
+            hidden: &shown.hidden,
+            moved,
+            weight: *weight,
+        });
+        Ok(drawn_together(self.base.canonical(), &parts.collect::<Vec<_>>()))
     }
 
-    /// The segment that is shown at a time, decoded.
-    fn segment_at(&self, seconds: f64) -> Result<Option<Arc<Shown>>, CodecError> {
+    /// The segments that are drawn at a time, decoded, and their weights.
+    fn drawn_at(&self, seconds: f64) -> Result<Vec<(Arc<Shown>, f32)>, CodecError> {
         if !seconds.is_finite() {
             return Err(CodecError::Invalid {
                 section: "rendering",
@@ -155,7 +162,11 @@ impl PlayableTake {
                 expected: "a finite number of seconds".into(),
             });
         }
-        let Some(number) = self.take.segment_at(seconds) else { return Ok(None) };
+        let drawn = self.take.drawn_at(seconds).into_iter();
+        drawn.map(|DrawnSegment { segment, weight }| Ok((self.decoded_segment(segment)?, weight))).collect()
+    }
+
+    fn decoded_segment(&self, number: usize) -> Result<Arc<Shown>, CodecError> {
         // Held while a segment is decoded, so that no two threads decode the same one.
         let mut decoded = self.decoded.lock().unwrap_or_else(PoisonError::into_inner);
         let found = decoded.iter().position(|(other, _)| *other == number);
@@ -170,7 +181,7 @@ impl PlayableTake {
         };
         let shown = entry.1.clone();
         decoded.push(entry);
-        Ok(Some(shown))
+        Ok(shown)
     }
 
     fn decode_segment(&self, number: usize) -> Result<Shown, CodecError> {

@@ -62,30 +62,35 @@ fn playable() -> PlayableTake {
 }
 
 #[test]
-fn segments_move_by_their_own_times_up_to_the_joins() {
+fn segments_move_by_their_own_times_and_fade_at_the_joins() {
     let take = playable();
-    // (seconds, Gaussians of the base, height of the segment's): margins are a quarter of each stream.
-    let expected = [
-        (0.0, 3, Some(0.25)),
-        (1.0, 3, Some(0.5)),
-        (2.0_f64.next_down(), 3, Some(0.75)),
-        (2.0, 1, Some(0.25)),
-        (3.5, 1, Some(0.625)),
-        (4.0, 3, None),
-        (5.0, 3, None),
-        (6.0, 3, Some(0.25)),
-        (8.0, 3, None),
-        (-1.0, 3, None),
+    // (seconds, Gaussians of the base, heights of the segments'): margins are a quarter of each stream.
+    let expected: [(f64, usize, &[f32]); 11] = [
+        (0.0, 3, &[0.25]),
+        (1.0, 3, &[0.5]),
+        (1.5, 3, &[0.625, 0.125]),
+        (2.0, 3, &[0.75, 0.25]),
+        (3.0, 1, &[0.5]),
+        (3.5, 1, &[0.625]),
+        (4.0, 3, &[]),
+        (5.0, 3, &[]),
+        (6.0, 3, &[0.25]),
+        (8.0, 3, &[]),
+        (-1.0, 3, &[]),
     ];
-    for (seconds, of_base, height) in expected {
+    for (seconds, of_base, heights) in expected {
         let found = take.at(seconds).expect("Gaussians");
-        assert_eq!(found.len(), of_base + usize::from(height.is_some()), "{seconds}");
-        if let (Some(height), Some(last)) = (height, found.means.last()) {
-            assert!((last[2] - height as f32).abs() < 1e-5, "{seconds}: {last:?}");
+        assert_eq!(found.len(), of_base + heights.len(), "{seconds}");
+        for (height, mean) in heights.iter().zip(&found.means[of_base..]) {
+            assert!((mean[2] - height).abs() < 1e-5, "{seconds}: {mean:?}");
         }
     }
-    let hidden = take.at(2.5).expect("Gaussians");
+    let hidden = take.at(3.5).expect("Gaussians");
     assert_eq!(hidden.means[0], [0.0, 0.0, 0.0], "the middle one is not hidden");
+    // All opacities are equal; a quarter of the way, the later segment has a quarter, and what it hides three quarters.
+    let logits = take.at(1.5).expect("Gaussians").opacity_logits;
+    assert_eq!((logits[1], logits[0], logits[2]), (4.0, logits[3], logits[3]));
+    assert!(logits[4] < logits[3] && logits[3] < 4.0, "{logits:?}");
 }
 
 #[test]
@@ -102,7 +107,7 @@ fn images_are_those_of_the_gaussians_together() {
     let take = playable();
     let (eye, up) = ([0.0, -6.0, 0.0], [0.0, 0.0, 1.0]);
     let camera = Camera::look_at(eye.into(), [0.0; 3].into(), up.into(), 0.9, 65, 65);
-    for seconds in [1.0, 3.0, 5.0] {
+    for seconds in [1.0, 2.25, 3.0, 5.0] {
         let image = take.render(&camera, seconds, [0.1, 0.2, 0.3]).expect("an image");
         // The same Gaussians as one scene.
         let together = SceneData { gaussians: take.at(seconds).expect("Gaussians"), ..SceneData::default() };
@@ -124,11 +129,11 @@ fn a_bounded_number_of_segments_is_kept() {
         take.prepare(seconds).expect("a segment");
         take.decoded()
     };
-    assert_eq!([1.0, 3.0, 1.5, 5.0].map(after), [vec![0], vec![0, 1], vec![1, 0], vec![1, 0]]);
+    assert_eq!([1.0, 3.0, 0.5, 5.0].map(after), [vec![0], vec![0, 1], vec![1, 0], vec![1, 0]]);
     assert_eq!(after(7.0), [0, 2]);
-    let one = playable().keeping(0);
-    [1.0, 3.0].iter().for_each(|&seconds| one.prepare(seconds).expect("a segment"));
-    assert_eq!(one.decoded(), [1]);
+    let two = playable().keeping(0);
+    [7.0, 2.0].iter().for_each(|&seconds| two.prepare(seconds).expect("segments"));
+    assert_eq!(two.decoded(), [0, 1]);
 }
 
 #[test]

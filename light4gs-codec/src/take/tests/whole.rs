@@ -3,7 +3,7 @@
 use super::*;
 use crate::{
     FurtherAttribute, MotionArrays, NamedTensor,
-    take::{drawn_together, is_take},
+    take::{DrawnSegment, SegmentPart, drawn_together, is_take},
 };
 
 #[test]
@@ -94,17 +94,57 @@ fn readers_of_streams_and_of_takes_name_the_other() {
 }
 
 #[test]
-fn base_and_segment_are_drawn_together() {
+fn a_segment_fades_into_the_next_one() {
+    let times = |begin: f64, stream_begin: f64, stream_end: f64| {
+        let times = SegmentTimes { begin, end: begin + 2.0, stream_begin, stream_end, frames: 60 };
+        NewSegment { times, stream: stream(1, 0), hidden: Vec::new() }
+    };
+    // Margins of half a second at 2, a margin of one side at 4, more than half of a segment at 6, a gap after 8.
+    let segments =
+        [times(0.0, 0.0, 2.5), times(2.0, 1.5, 4.0), times(4.0, 3.0, 9.0), times(6.0, 2.0, 9.0), times(9.0, 8.0, 11.0)];
+    let take = read(&write_take(&meta(), &stream(1, 0), &segments, 0).expect("a take")).expect("a take");
+    let drawn = |seconds: f64| take.drawn_at(seconds).iter().map(|one| (one.segment, one.weight)).collect::<Vec<_>>();
+    for (seconds, segment) in [(0.0, 0), (1.5, 0), (2.5, 1), (3.0, 1), (4.0, 2), (5.0, 2), (7.0, 3), (7.9, 3), (9.0, 4)]
+    {
+        assert_eq!(drawn(seconds), [(segment, 1.0)], "{seconds}");
+    }
+    for (seconds, expected) in [
+        (1.75, [(0, 0.75), (1, 0.25)]),
+        (2.0, [(0, 0.5), (1, 0.5)]),
+        (2.25, [(0, 0.25), (1, 0.75)]),
+        (3.5, [(1, 0.5), (2, 0.5)]),
+        (5.5, [(2, 0.75), (3, 0.25)]),
+        (6.5, [(2, 0.25), (3, 0.75)]),
+    ] {
+        assert_eq!(drawn(seconds), expected, "{seconds}");
+    }
+    for seconds in [8.5, -1.0, 11.0, f64::NAN] {
+        assert!(drawn(seconds).is_empty(), "{seconds}");
+    }
+    let DrawnSegment { weight, .. } = take.drawn_at(2.0_f64.next_up())[1];
+    assert!(weight >= 0.5 && weight < 0.51);
+}
+
+#[test]
+fn base_and_segments_are_drawn_together() {
     let mut base = gaussians(3, 0);
     base.further.push(FurtherAttribute { name: "age".into(), width: 1, values: vec![0.0; 3], optional: true });
     let moving = gaussians(2, 1);
-    let drawn = drawn_together(&base, &[true, false, true], Some(&moving));
+    let part = |hidden, moved, weight| SegmentPart { hidden, moved, weight };
+    let drawn = drawn_together(&base, &[part(&[true, false, true], &moving, 1.0)]);
     assert_eq!(drawn.means, [base.means[1], moving.means[0], moving.means[1]]);
     assert_eq!((drawn.sh_degree, drawn.sh_rest.len()), (1, 27));
     assert_eq!((&drawn.sh_rest[..9], &drawn.sh_rest[9..]), (&[0.0; 9][..], &moving.sh_rest[..]));
     assert!(drawn.further.is_empty());
     // The other way round, and nothing hidden.
-    let drawn = drawn_together(&moving, &[], Some(&base));
+    let drawn = drawn_together(&moving, &[part(&[], &base, 1.0)]);
     assert_eq!((drawn.len(), &drawn.sh_rest[..18], &drawn.sh_rest[18..]), (5, &moving.sh_rest[..], &[0.0; 27][..]));
-    assert_eq!(drawn_together(&moving, &[], None), moving);
+    assert_eq!(drawn_together(&moving, &[]), moving);
+    // Two segments: what both hide is gone, what one hides has the other's weight, what none hides is as it was.
+    let opaque = |count| GaussianArrays { opacity_logits: vec![2.0; count], ..gaussians(count, 0) };
+    let [base, moving] = [opaque(3), opaque(1)];
+    let halves = [part(&[true, true, false], &moving, 0.25), part(&[true, false, false], &moving, 0.75)];
+    let logits = drawn_together(&base, &halves).opacity_logits;
+    assert_eq!((logits.len(), logits[1]), (4, 2.0));
+    assert!(logits[0] == logits[3] && logits[2] < logits[3] && logits[3] < 2.0, "{logits:?}");
 }

@@ -23,12 +23,7 @@ pub(in crate::config) fn resolve(
     collect(top, None, &mut Vec::new(), &mut layers)?;
     layers.reverse();
     for origin in above {
-        let (_, text) = read(origin, None)?;
-        let (layer, extends) = parse(&text, origin)?;
-        if extends.is_some() {
-            return Err(ConfigError::LayerExtends { origin: origin.clone() });
-        }
-        layers.push((origin.clone(), layer));
+        layers.push((origin.clone(), on_top(origin, None)?));
     }
     layers.extend(Overrides::parse(override_texts)?.into_layers());
     build(layers)
@@ -40,7 +35,7 @@ pub(in crate::config) fn resolve_text(text: &str, origin: &str) -> Result<Config
     let (layer, extends) = parse(text, &origin)?;
     let mut layers = vec![(origin.clone(), layer)];
     if let Some(below) = extends {
-        collect(&named(&below, None), Some(&origin), &mut Vec::new(), &mut layers)?;
+        collect_below(&below, &origin, &mut Vec::new(), &mut layers)?;
     }
     layers.reverse();
     build(layers)
@@ -101,14 +96,37 @@ fn collect(
     above.push(identity);
     let (layer, extends) = parse(&text, origin)?;
     into.push((origin.clone(), layer));
-    let Some(below) = extends else { return Ok(()) };
-    let below = match origin {
+    extends.map_or(Ok(()), |below| collect_below(&below, origin, above, into))
+}
+
+/// The same for what a layer extends: a name, or several joined by `+`.
+fn collect_below(
+    below: &str,
+    by: &Origin,
+    above: &mut Vec<Origin>,
+    into: &mut Vec<(Origin, Table)>,
+) -> Result<(), ConfigError> {
+    let meant = |name: &str| match by {
         // The binary must not depend on the folder in which it runs.
-        Origin::Preset(_) => Origin::Preset(below),
-        Origin::File(path) => named(&below, path.parent()),
-        Origin::Text(_) => named(&below, None),
+        Origin::Preset(_) => Origin::Preset(name.to_owned()),
+        Origin::File(path) => named(name, path.parent()),
+        Origin::Text(_) => named(name, None),
     };
-    collect(&below, Some(origin), above, into)
+    let names = split(below);
+    for name in names[1..].iter().rev() {
+        let origin = meant(name);
+        into.push((origin.clone(), on_top(&origin, Some(by))?));
+    }
+    collect(&meant(names[0]), Some(by), above, into)
+}
+
+/// A layer that may be laid on top of any other.
+fn on_top(origin: &Origin, by: Option<&Origin>) -> Result<Table, ConfigError> {
+    let (_, text) = read(origin, by)?;
+    match parse(&text, origin)? {
+        (layer, None) => Ok(layer),
+        (_, Some(_)) => Err(ConfigError::LayerExtends { origin: origin.clone() }),
+    }
 }
 
 /// The text of a layer, and its origin in a form that is the same for all paths of one file.

@@ -19,11 +19,7 @@ pub(in crate::config) fn nearest(name: &str) -> &'static str {
     light4gs_keys::nearest(PRESETS.iter().map(|(known, _)| *known), name).unwrap_or("base")
 }
 
-/// The preset that fits datasets of a layout, or several joined by `+`: the one of the layout's name for a CPU. Objects
-/// of D-NeRF are rigid bodies for the most part, which control nodes move in fewer bytes.
+/// The preset that fits datasets of a layout: the one of its name.
 pub(in crate::config) fn of_layout(layout: &str) -> Option<&'static str> {
-    match layout {
-        "dnerf" => Some("dnerf-cpu+nodes"),
-        _ => PRESETS.iter().map(|(name, _)| *name).find(|name| name.strip_suffix("-cpu") == Some(layout)),
-    }
+    PRESETS.iter().map(|(name, _)| *name).find(|name| *name == layout)
 }

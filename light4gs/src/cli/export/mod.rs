@@ -58,7 +58,7 @@ pub(super) struct Export {
     /// In a .glb: the scene's z axis points up, as in Blender. glTF's y axis does.
     #[arg(long)]
     z_up: bool,
-    /// Back end: ndarray, flex, wgpu, or wgpu with an adapter such as wgpu:0.
+    /// Back end: auto (a graphics card where there is one), ndarray, flex, wgpu, or wgpu with an adapter such as wgpu:0.
     #[arg(long, default_value_t)]
     device: DeviceName,
     #[command(flatten)]

@@ -8,6 +8,7 @@ use light4gs_lab::study::manifest::{Manifest, StudyFolder};
 use light4gs_lab::study::quality_curves::{QualityCurves, quality_curves};
 use light4gs_lab::study::remaining::Remaining;
 use light4gs_lab::study::results::Results;
+use light4gs_lab::study::rows::record;
 use light4gs_lab::study::selection::Selection;
 use light4gs_lab::study::table::{StudyTable, legend, tables, to_markdown};
 use light4gs_train::error::TrainError;
@@ -55,6 +56,7 @@ pub(super) fn gather(
     let curves = quality_curves(manifest, &results);
     let file = ResultsFile { results: &results, tables: &tables, curves: &curves };
     folder.write_json("results.json", &file)?;
+    folder.write("record.json", format!("{}\n", record(manifest, &results, &curves)).as_bytes())?;
     folder.write("results.csv", results.to_csv(manifest, false).as_bytes())?;
     folder.write("times.csv", results.to_csv(manifest, true).as_bytes())?;
     folder.write("table.md", to_markdown(manifest, &results, &tables, &curves).as_bytes())?;

@@ -21,6 +21,7 @@ use serde::Serialize;
 pub(super) use gather::Gather;
 pub(super) use task::StudyTask;
 
+use super::command_line::command_line;
 use super::launch::{LaunchOptions, Launcher, TaskFolder, local, slurm};
 use super::output::{say, say_json};
 
@@ -48,7 +49,7 @@ pub(super) struct Study {
     /// the file is written are trained once.
     #[arg(long)]
     out: Option<PathBuf>,
-    /// The preset or TOML file that every variant starts from, in place of dnerf-cpu or the study's own; {scene} in it
+    /// The preset or TOML file that every variant starts from, in place of hexplane-dnerf-cpu or the study's own; {scene} in it
     /// stands for the scene's name.
     #[arg(long, value_name = "PRESET|FILE")]
     config: Option<String>,
@@ -58,7 +59,7 @@ pub(super) struct Study {
     /// Changes one key of every variant's configuration; may be given more than once.
     #[arg(long = "set", value_name = "KEY=VALUE")]
     overrides: Vec<String>,
-    /// Back end: ndarray, flex, wgpu, or wgpu with an adapter such as wgpu:0.
+    /// Back end: auto (a graphics card where there is one), ndarray, flex, wgpu, or wgpu with an adapter such as wgpu:0.
     #[arg(long)]
     device: Option<DeviceName>,
     /// Runs of each variant on each scene, with different seeds: tables then show mean and standard deviation.
@@ -93,7 +94,8 @@ impl Study {
         overrides.extend(self.device.map(|device| format!("device={device}")));
         let (config, scenes, schedule) = (self.config, self.scenes, self.schedule);
         let (seeds, reuse) = (self.seeds, self.reuse);
-        let options = PlanOptions { config, scenes, schedule, overrides, seeds, reuse };
+        let command = command_line();
+        let options = PlanOptions { config, scenes, schedule, overrides, seeds, reuse, command };
         let plan = Plan::new(Definition::load(&self.name)?, &options)?;
         for study in &plan.reuse {
             StudyFolder::open(study)?;

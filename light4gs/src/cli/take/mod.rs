@@ -9,9 +9,9 @@ use clap::Args;
 use light4gs_data::Scene;
 use light4gs_lab::study::results::is_finished;
 use light4gs_train::config::Config;
-use light4gs_train::dataset::load_options;
+use light4gs_train::dataset::{image_store, load_options};
 use light4gs_train::error::TrainError;
-use light4gs_train::take::{TakeFolder, TakePlan};
+use light4gs_train::take::{SegmentLength, TakeFolder, TakePlan, cuts};
 
 pub(super) use measure::{eval_file, eval_folder, info, is_take_file};
 pub(super) use task::TakeTask;
@@ -37,14 +37,20 @@ pub(super) fn train_take(
     config: &Config,
     scene: &Path,
     out: &Path,
-    segment: f64,
+    plan: TakePlan,
     launch: &LaunchOptions,
     quiet: bool,
 ) -> Result<(), TrainError> {
     let data = Scene::open(scene, &load_options(config))?;
-    let plan = TakePlan::of(&data, seconds_of(&data)?, segment)?;
     let folder = TakeFolder::create(out, scene, &data, plan, config)?;
     train_missing(&folder, launch, quiet)
+}
+
+/// How a capture is divided into segments.
+pub(super) fn plan_of(config: &Config, scene: &Path, length: SegmentLength) -> Result<TakePlan, TrainError> {
+    let data = Scene::open(scene, &load_options(config))?;
+    let seconds = seconds_of(&data)?;
+    TakePlan::of(&data, seconds, length, &cuts(&data, &image_store(config))?)
 }
 
 /// Goes on with the training of a take, one part after the other.
@@ -139,7 +145,8 @@ impl Extend {
         let mut folder = TakeFolder::open(&self.run)?;
         let data = Scene::open(&self.scene, &load_options(folder.config()))?;
         let seconds = seconds_of(&data)?;
-        folder.extend(&self.scene, &data, seconds)?;
+        let cuts = cuts(&data, &image_store(folder.config()))?;
+        folder.extend(&self.scene, &data, seconds, &cuts)?;
         train_missing(&folder, &self.launch, self.quiet)
     }
 }

@@ -44,7 +44,7 @@ fn run_task(folder: &TakeFolder, task: usize, quiet: bool) -> Result<(), TrainEr
         _ => {
             let number = task - 1;
             let segment = &folder.record().plan.segments[number];
-            (format!("segment {number}"), folder.segment(number), folder.config_of_segment(segment))
+            (format!("segment {number}"), folder.segment(number), folder.config_of_segment(segment)?)
         }
     };
     if is_finished(&run) {

@@ -67,7 +67,7 @@ fn write_golden_nodes() {
         let keys = ["model.field=nodes", "model.nodes.count=12", "model.nodes.radius=0.25", "model.sh_degree=1"];
         let mut keys = keys.map(str::to_owned).to_vec();
         keys.push(format!("model.nodes.{own}"));
-        let config = Config::load("dnerf-cpu", &keys).unwrap();
+        let config = Config::load("hexplane-dnerf-cpu", &keys).unwrap();
         let scene = scene(&config, &device);
         let compression = Compression::new(&ConfiguredModels, &config, scene.planes(), &device).unwrap();
         let profile = config.compression.profile.coded().unwrap();

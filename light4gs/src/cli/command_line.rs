@@ -1,0 +1,36 @@
+//! The command of this process as a shell takes it, for records.
+
+use std::env;
+
+/// Such as `RAYON_NUM_THREADS=1 light4gs study sizes dnerf/flag --out runs/sizes`: the number of threads where it is set, and the
+/// arguments as they were given.
+pub(super) fn command_line() -> String {
+    let threads = env::var("RAYON_NUM_THREADS").ok().map(|count| format!("RAYON_NUM_THREADS={}", quoted(&count)));
+    let arguments = env::args_os().skip(1).map(|argument| quoted(&argument.to_string_lossy()));
+    threads.into_iter().chain(["light4gs".to_owned()]).chain(arguments).collect::<Vec<_>>().join(" ")
+}
+
+fn quoted(argument: &str) -> String {
+    let plain = |c: char| c.is_alphanumeric() || "_-+=./:,@%".contains(c);
+    if !argument.is_empty() && argument.chars().all(plain) {
+        return argument.to_owned();
+    }
+    format!("'{}'", argument.replace('\'', r"'\''"))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::quoted;
+
+    #[test]
+    fn a_shell_reads_back_what_was_given() {
+        for (argument, text) in [
+            ("dnerf/flag", "dnerf/flag"),
+            ("hexplane-dnerf-{scene}-cpu", "'hexplane-dnerf-{scene}-cpu'"),
+            ("", "''"),
+            ("it's", r"'it'\''s'"),
+        ] {
+            assert_eq!(quoted(argument), text);
+        }
+    }
+}
