@@ -75,12 +75,21 @@ pub fn open(name: DeviceName) -> Result<Device, TrainError> {
         #[cfg(feature = "wgpu")]
         DeviceName::Wgpu(adapter) => wgpu::open(name, adapter),
         #[allow(unreachable_patterns)]
-        _ => Err(TrainError::Input(format!(
-            "this build has no back end `{}`; it has {}. Build with `--features {}`, or name another device",
-            name.back_end(),
-            built_in().join(", "),
-            name.back_end()
-        ))),
+        _ => {
+            let back_end = name.back_end();
+            // In the archives for Linux there are two programs: a static one cannot load a graphics driver.
+            let archive = match back_end {
+                "wgpu" => {
+                    ", or keep `light4gs-gpu` of the archive for Linux beside `light4gs` (it needs glibc 2.17 or newer)"
+                }
+                _ => "",
+            };
+            Err(TrainError::Input(format!(
+                "this build has no back end `{back_end}`; it has {}. Name another device, or build with `--features \
+                 {back_end}`{archive}",
+                built_in().join(", ")
+            )))
+        }
     }
 }
 

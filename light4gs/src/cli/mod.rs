@@ -4,12 +4,16 @@ mod bench;
 mod check;
 mod command_line;
 mod compare;
+mod completions;
 mod container;
 mod export;
 mod gpu_errors;
+#[cfg(unix)]
+pub mod hand_over;
 mod import;
 mod launch;
 mod limits;
+mod man;
 mod output;
 mod prepare;
 mod quickstart;
@@ -125,6 +129,15 @@ enum Command {
     /// Time every part of a training step on one or more devices.
     #[command(after_help = "Example:\n  light4gs bench --device ndarray,flex,wgpu --gaussians 20000 --size 400")]
     Bench(bench::Bench),
+    /// Print what completes the arguments of light4gs in a shell.
+    #[command(
+        hide = true,
+        after_help = "Example:\n  light4gs completions bash > ~/.local/share/bash-completion/completions/light4gs"
+    )]
+    Completions(completions::Completions),
+    /// Write pages for `man`, one for each command.
+    #[command(hide = true, after_help = "Example:\n  light4gs man --out ~/.local/share/man/man1")]
+    Man(man::Man),
 }
 
 impl Cli {
@@ -156,6 +169,8 @@ impl Cli {
             Command::TakeTask(command) => command.run(),
             Command::Compare(command) => command.run(),
             Command::Bench(command) => command.run(),
+            Command::Completions(command) => command.run(),
+            Command::Man(command) => command.run(),
         }
     }
 }
