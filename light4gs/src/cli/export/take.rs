@@ -74,7 +74,11 @@ impl<'a> Frames<'a> {
     fn without_segment(&self) -> String {
         let count = self.numbers().filter(|frame| self.segment(*frame).is_none()).count();
         let all = self.count;
-        if count == 0 { String::new() } else { format!("; {count} of the {all} frames have no segment, so nothing moves in them") }
+        if count == 0 {
+            String::new()
+        } else {
+            format!("; {count} of the {all} frames have no segment, so nothing moves in them")
+        }
     }
 }
 
@@ -85,7 +89,9 @@ impl Export {
         let single_time = matches!(target, Target::Ply | Target::Glb);
         if !single_time && (self.at.is_some() || self.base) {
             let option = if self.base { "--base" } else { "--at" };
-            return Err(TrainError::Input(format!("{option} is one time of a take; name a .ply or .glb file with --out")));
+            return Err(TrainError::Input(format!(
+                "{option} is one time of a take; name a .ply or .glb file with --out"
+            )));
         }
         if self.base {
             let take = PlayableTake::new(Take::open_front(&self.file, &limits)?, &limits)?;
@@ -105,7 +111,9 @@ impl Export {
             let seconds = self.at.unwrap_or(0.0);
             if !(0.0..=index.seconds()).contains(&seconds) {
                 let most = index.seconds();
-                return Err(TrainError::Input(format!("--at must be 0 to {most:.2}, the seconds of the take, not {seconds}")));
+                return Err(TrainError::Input(format!(
+                    "--at must be 0 to {most:.2}, the seconds of the take, not {seconds}"
+                )));
             }
             return self.write_single(path, target, take.at(seconds)?);
         }
@@ -129,7 +137,11 @@ impl Export {
             }
         }
         let fps = frames.fps;
-        say(format_args!("{:.2} seconds, {fps} frames a second{}", f64::from(frames.count) / fps, frames.without_segment()))
+        say(format_args!(
+            "{:.2} seconds, {fps} frames a second{}",
+            f64::from(frames.count) / fps,
+            frames.without_segment()
+        ))
     }
 
     fn refuse_options_of_clips(&self) -> Result<(), TrainError> {
@@ -139,13 +151,15 @@ impl Export {
             () => return Ok(()),
         };
         let file = self.file.display();
-        Err(TrainError::Input(format!("{file} is a take, whose times are in seconds: give {remedy} instead of {option}")))
+        Err(TrainError::Input(format!(
+            "{file} is a take, whose times are in seconds: give {remedy} instead of {option}"
+        )))
     }
 
     /// The error of a file that cannot be opened as a whole, with a hint where its base is there.
     fn with_remedy(&self, error: CodecError, limits: &Limits) -> TrainError {
-        let front_is_there = error.kind() == "truncated"
-            && Take::open_front(&self.file, limits).is_ok_and(|front| front.base().is_ok());
+        let front_is_there =
+            error.kind() == "truncated" && Take::open_front(&self.file, limits).is_ok_and(|front| front.base().is_ok());
         if front_is_there {
             TrainError::Input(format!("{error}; its base is there, and --base writes it"))
         } else {
@@ -186,7 +200,8 @@ impl Export {
         for (number, place) in index.segments().iter().enumerate() {
             let TakeSegment { times, stream, hidden } = take.take().segment(number)?;
             let of_segment = |error| CodecError::InTake { part: format!("segment {number}"), error: Box::new(error) };
-            let decoded = OpenStream::with_limits(&stream, limits).and_then(|stream| stream.decode()).map_err(of_segment)?;
+            let decoded =
+                OpenStream::with_limits(&stream, limits).and_then(|stream| stream.decode()).map_err(of_segment)?;
             let data: SceneData = decoded.scene;
             let scene: DynamicScene = DynamicScene::from_arrays(&data, &device)?;
             let name = names.name(number);
@@ -217,7 +232,8 @@ impl Export {
             list.push(json!({"file": name, "begin": times.begin, "end": times.end}));
         }
         let meta = index.meta();
-        let text = json!({"name": meta.name, "fps": meta.fps, "seconds": index.seconds(), "base": base, "segments": list});
+        let text =
+            json!({"name": meta.name, "fps": meta.fps, "seconds": index.seconds(), "base": base, "segments": list});
         write_atomically(&folder.join(SEGMENTS), |file| writeln!(file, "{text:#}"))?;
         say(format_args!("wrote {} segments to {}{}", list.len(), folder.display(), report.text()))
     }
@@ -264,8 +280,8 @@ impl Keyframes {
 
 #[cfg(test)]
 mod tests {
-    use light4gs_codec::take::{NewSegment, SegmentTimes, TakeMeta, write_take};
     use light4gs_codec::encode;
+    use light4gs_codec::take::{NewSegment, SegmentTimes, TakeMeta, write_take};
 
     use super::*;
 
@@ -284,7 +300,9 @@ mod tests {
 
     #[test]
     fn frames_are_those_of_the_take_wherever_its_segments_end() {
-        let count = |seconds, segments: &[(f64, f64)], fps| Frames::of(take(seconds, segments).index(), fps).map(|frames| frames.count).unwrap();
+        let count = |seconds, segments: &[(f64, f64)], fps| {
+            Frames::of(take(seconds, segments).index(), fps).map(|frames| frames.count).unwrap()
+        };
         // From the first of 30 frames to the last there are 2.9 seconds; the last one is shown until second 3.
         assert_eq!(count(2.9, &[(0.0, 1.5), (1.5, 3.0)], 10.0), 30);
         assert_eq!(count(2.9, &[(0.0, 1.5)], 10.0), 30, "the second half is not trained");
