@@ -137,6 +137,23 @@ impl IndexReader {
         Ok(Some(link.range()))
     }
 
+    /// Whether all that is before the base has been read. Then [`IndexReader::finish_front`] can be called.
+    pub fn has_front(&self) -> bool {
+        self.meta.is_some()
+    }
+
+    /// The index without any segment, for a file of which so many bytes are there: what is said of the take, and where its base
+    /// is. Further blocks of the index need not have been read, and what the segments of the first one say is not used: their bytes
+    /// may be missing.
+    ///
+    /// # Errors
+    /// A base that goes beyond the bytes; ranges before the base that were not pushed.
+    pub fn finish_front(self, file_bytes: u64) -> Result<TakeIndex, CodecError> {
+        let needed = self.needed.filter(|_| self.meta.is_none());
+        let front = Self { needed, segments: Vec::new(), room: Room::default(), ..self };
+        front.finish(file_bytes)
+    }
+
     /// The index, for a file of a length in bytes. The length must have been asked for after the last range was read, where the
     /// file can grow.
     ///

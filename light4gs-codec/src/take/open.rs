@@ -1,6 +1,6 @@
 //! Reading a take, segment by segment.
 
-use std::borrow::Cow;
+use std::{borrow::Cow, ops::Range};
 #[cfg(not(target_os = "unknown"))]
 use std::{
     fs::File,
@@ -75,6 +75,34 @@ impl Take {
     pub fn open(path: &Path, limits: &Limits) -> Result<Self, CodecError> {
         let (file, _) = open_regular(path, File::options().read(true))?;
         let index = read_index(path, &file, limits)?;
+        let source = Source::File { path: path.to_owned(), file: Mutex::new(file), limits: *limits };
+        Ok(Self { index, source })
+    }
+
+    /// The first bytes of a take in memory, as a take without segments: what is said of it, and its base.
+    /// [`TakeIndex::base`] says where the base ends; what is behind it may be missing.
+    ///
+    /// # Errors
+    /// As [`Take::read`] for the bytes up to the end of the base.
+    pub fn read_front(bytes: Vec<u8>, limits: &Limits) -> Result<Self, CodecError> {
+        let mut reader = IndexReader::new(limits);
+        push_front(&mut reader, |range| {
+            let end = range.end.min(bytes.len() as u64);
+            Ok(bytes[range.start.min(end) as usize..end as usize].to_vec())
+        })?;
+        Ok(Self { index: reader.finish_front(bytes.len() as u64)?, source: Source::Memory(bytes) })
+    }
+
+    /// The same of a file, which may be a whole take, or one that is cut off behind its base.
+    ///
+    /// # Errors
+    /// As [`Take::read_front`], and what the system refuses; the message names the file.
+    #[cfg(not(target_os = "unknown"))]
+    pub fn open_front(path: &Path, limits: &Limits) -> Result<Self, CodecError> {
+        let (file, bytes) = open_regular(path, File::options().read(true))?;
+        let mut reader = IndexReader::new(limits);
+        let pushed = push_front(&mut reader, |range| read_at(&file, path, range.start, range.end - range.start));
+        let index = pushed.and_then(|()| reader.finish_front(bytes)).map_err(|error| name(path, error))?;
         let source = Source::File { path: path.to_owned(), file: Mutex::new(file), limits: *limits };
         Ok(Self { index, source })
     }
@@ -162,6 +190,17 @@ impl Take {
         let TakeSegment { times, hidden, .. } = self.index.open_segment(segment, &bytes)?;
         Ok(TakeSegment { times, stream: stream.into(), hidden })
     }
+}
+
+/// Pushes what is before the base.
+fn push_front(
+    reader: &mut IndexReader,
+    mut read: impl FnMut(Range<u64>) -> Result<Vec<u8>, CodecError>,
+) -> Result<(), CodecError> {
+    while let Some(range) = reader.needed().filter(|_| !reader.has_front()) {
+        reader.push(&read(range)?)?;
+    }
+    Ok(())
 }
 
 /// Reads the index of a file.

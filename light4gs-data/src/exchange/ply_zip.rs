@@ -12,18 +12,21 @@ use crate::numbered::NumberedFiles;
 use crate::ply::GaussianPly;
 
 /// Writes the Gaussians of successive times. Entries are stored as they are, since float32 hardly gets smaller and a browser
-/// shows them sooner. The file is complete or absent.
+/// shows them sooner. The file is complete or absent. One time is in memory at once.
 ///
 /// # Errors
-/// As [`GaussianPly::write`].
-pub fn write_ply_zip(path: &Path, times: impl ExactSizeIterator<Item = GaussianPly>) -> Result<(), DataError> {
+/// The first error of `times`; as [`GaussianPly::write`].
+pub fn write_ply_zip<E: From<DataError>>(
+    path: &Path,
+    times: impl ExactSizeIterator<Item = Result<GaussianPly, E>>,
+) -> Result<(), E> {
     let mut refused = None;
     let files = NumberedFiles::new(times.len(), "ply");
     let written = write_atomically(path, |file| {
         let mut archive = ZipWriter::new(file);
         let options = FileOptions::default().compression_method(zip::CompressionMethod::Stored);
         for (k, gaussians) in times.enumerate() {
-            let bytes = gaussians.bytes(path).map_err(|problem| {
+            let bytes = gaussians.and_then(|gaussians| Ok(gaussians.bytes(path)?)).map_err(|problem| {
                 refused = Some(problem);
                 io::Error::other("a PLY file was refused")
             })?;
@@ -35,7 +38,7 @@ pub fn write_ply_zip(path: &Path, times: impl ExactSizeIterator<Item = GaussianP
     });
     match refused {
         Some(problem) => Err(problem),
-        None => written,
+        None => Ok(written?),
     }
 }
 
@@ -62,7 +65,8 @@ mod tests {
     fn an_archive_holds_a_file_for_each_time() {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("scene.zip");
-        write_ply_zip(&path, [1.0, 2.0, 3.0].into_iter().map(gaussians)).unwrap();
+        let times = [1.0, 2.0, 3.0].map(|x| Ok::<_, DataError>(gaussians(x)));
+        write_ply_zip(&path, times.into_iter()).unwrap();
         let mut archive = zip::ZipArchive::new(std::fs::File::open(&path).unwrap()).unwrap();
         let names: Vec<String> = (0..3).map(|entry| archive.by_index(entry).unwrap().name().to_owned()).collect();
         assert_eq!((archive.len(), names), (3, ["0000.ply", "0001.ply", "0002.ply"].map(String::from).to_vec()));
@@ -78,8 +82,11 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("scene.zip");
         let damaged = GaussianPly { quats: Vec::new(), ..gaussians(1.0) };
-        let problem = write_ply_zip(&path, [gaussians(0.0), damaged].into_iter()).unwrap_err().to_string();
+        let times = [gaussians(0.0), damaged].map(Ok::<_, DataError>);
+        let problem = write_ply_zip(&path, times.into_iter()).unwrap_err().to_string();
         assert!(problem.contains("1 means"), "{problem}");
+        let times = [Ok(gaussians(0.0)), Err(DataError::Options { option: "time", problem: "is over".into() })];
+        assert!(write_ply_zip(&path, times.into_iter()).unwrap_err().to_string().contains("is over"));
         assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 0);
     }
 }

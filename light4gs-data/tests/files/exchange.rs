@@ -303,6 +303,14 @@ fn a_skin_that_contradicts_itself_is_refused() {
     assert!(error(&example(1), &odd).contains("NaN"));
 }
 
+fn write_samples(
+    path: &Path,
+    samples: impl Iterator<Item = MotionSample>,
+    duration: f64,
+) -> Result<(), light4gs_data::DataError> {
+    write_four_dgs(path, &example(50), samples.map(Ok), duration)
+}
+
 #[test]
 fn a_four_dgs_file_reads_back_at_every_time() {
     let folder = tempfile::tempdir().unwrap();
@@ -314,9 +322,8 @@ fn a_four_dgs_file_reads_back_at_every_time() {
         gaussians.log_scales.iter_mut().for_each(|scale| scale[1] += 0.01 * k as f32);
         gaussians
     };
-    let samples: Vec<MotionSample> =
-        (0..frames).map(|k| MotionSample { begin: k as f64 / fps, gaussians: at(k) }).collect();
-    write_four_dgs(&path, &samples, frames as f64 / fps).unwrap();
+    let sample = |k: usize| MotionSample { begin: k as f64 / fps, anew: false, gaussians: at(k) };
+    write_samples(&path, (0..frames).map(sample), frames as f64 / fps).unwrap();
     let bytes = std::fs::read(&path).unwrap();
     let (streamed, (indexed, _)) = (
         fourdgs::keyframe_delta_file::decode_streamed(&bytes).unwrap(),
@@ -343,9 +350,121 @@ fn a_four_dgs_file_reads_back_at_every_time() {
         }
     }
     // Samples out of order are refused by name, and the file stays as it was.
-    let error = write_four_dgs(&path, &samples[3..], 2.0).unwrap_err().to_string();
+    let error = write_samples(&path, (3..frames).map(sample), 2.0).unwrap_err().to_string();
     assert!(error.contains("a.4dgs") && error.contains("t0"), "{error}");
-    assert_eq!(std::fs::read(&path).unwrap(), bytes);
+    assert!(std::fs::read(&path).unwrap() == bytes, "the file has changed");
+    // As are other samples that cannot be.
+    let mut odd = example(50);
+    odd.means[7][1] = f32::INFINITY;
+    let odd = MotionSample { begin: 0.0, anew: false, gaussians: odd };
+    assert!(write_samples(&path, [odd].into_iter(), 1.0).unwrap_err().to_string().contains("not finite"));
+    for (samples, duration) in [(0, 1.0), (2, 0.1), (2, 0.0), (2, f64::NAN)] {
+        assert!(write_samples(&path, (0..samples).map(sample), duration).is_err(), "{samples} in {duration} s");
+    }
+    let broken = [Ok(sample(0)), Err(light4gs_data::DataError::Options { option: "time", problem: "is over".into() })];
+    assert!(write_four_dgs(&path, &example(50), broken, 2.0).unwrap_err().to_string().contains("is over"));
+    assert!(std::fs::read(&path).unwrap() == bytes, "the file has changed");
+}
+
+/// The crate's own writer, which holds all samples at once, writes the same bytes.
+#[test]
+fn a_four_dgs_file_is_that_of_the_containers_own_writer() {
+    use fourdgs::keyframe_delta_file::{KeyframeDeltaOptions, Sample, write_sequence};
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("a.4dgs");
+    // The first sample has the lowest positions and the median scale of all, by which that writer chooses its steps.
+    let at = |k: usize| {
+        let mut gaussians = example(50);
+        gaussians.log_scales = vec![[-3.0; 3]; 50];
+        gaussians.means.iter_mut().skip(20).for_each(|mean| mean[0] += 0.05 * k as f32);
+        gaussians.quats.iter_mut().skip(30).for_each(|quat| quat[1] += 0.2 * k as f32);
+        gaussians.opacity_logits.iter_mut().skip(40).for_each(|logit| *logit -= 0.1 * k as f32);
+        gaussians
+    };
+    let (frames, duration) = (20usize, 5.0);
+    let begin = |k: usize| k as f64 / 4.0;
+    let sample = |k: usize| MotionSample { begin: begin(k), anew: false, gaussians: at(k) };
+    write_samples(&path, (0..frames).map(sample), duration).unwrap();
+    let theirs = |k: usize| {
+        let GaussianPly { means, sh_dc, opacity_logits, log_scales, quats, .. } = at(k);
+        let count = means.len();
+        let linear = |value: f32| {
+            let value = (value * 0.282_094_8 + 0.5).clamp(0.0, 1.0);
+            if value <= 0.040_45 { value / 12.92 } else { ((value + 0.055) / 1.055).powf(2.4) }
+        };
+        let rotation = |[w, x, y, z]: [f32; 4]| {
+            let length = (w * w + x * x + y * y + z * z).sqrt();
+            [x, y, z, w].map(|part| part / length)
+        };
+        let gaussians = fourdgs::GaussianSet {
+            positions: means.concat(),
+            scales: log_scales.concat().into_iter().map(f32::exp).collect(),
+            rotations: quats.into_iter().flat_map(rotation).collect(),
+            colors: sh_dc
+                .into_iter()
+                .zip(opacity_logits)
+                .flat_map(|([r, g, b], logit)| [linear(r), linear(g), linear(b), 1.0 / (1.0 + (-logit).exp())])
+                .collect(),
+            motions: vec![0.0; 3 * count],
+            mu_t: vec![begin(k - k % 8) as f32; count],
+            sigma_t: vec![1000.0 * duration as f32; count],
+            win_lo: vec![0.0; count],
+            win_hi: vec![duration as f32; count],
+            ..fourdgs::GaussianSet::default()
+        };
+        Sample { t0: begin(k), ids: (0..count as i64).collect(), gaussians }
+    };
+    let options = KeyframeDeltaOptions {
+        profile: fourdgs::quantization::Profile::Fine,
+        library: concat!("Light4GS ", env!("CARGO_PKG_VERSION")).to_owned(),
+        ..KeyframeDeltaOptions::default()
+    };
+    let expected = write_sequence(&(0..frames).map(theirs).collect::<Vec<_>>(), duration, &options).unwrap();
+    let found = std::fs::read(&path).unwrap();
+    let first_other = found.iter().zip(&expected).position(|(found, expected)| found != expected);
+    assert_eq!((first_other, found.len()), (None, expected.len()));
+}
+
+/// Segments of a take: Gaussians that stand still, and others that are new in each segment.
+#[test]
+fn gaussians_of_a_four_dgs_file_may_be_others_from_a_sample_on() {
+    use fourdgs::keyframe_delta_validate::{ValidationMode, validate};
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("a.4dgs");
+    let counts = |k: usize| [50, 50, 30, 0][k / 5];
+    let at = |k: usize| {
+        let mut gaussians = example(counts(k));
+        gaussians.means.iter_mut().skip(40).for_each(|mean| mean[0] += 0.1 * k as f32);
+        gaussians
+    };
+    let sample = |k: usize| MotionSample { begin: k as f64, anew: k == 5, gaussians: at(k) };
+    write_samples(&path, (0..20).map(sample), 20.0).unwrap();
+    let bytes = std::fs::read(&path).unwrap();
+    for mode in [ValidationMode::Streamed, ValidationMode::Indexed] {
+        let mut identities = Vec::new();
+        let mut source = fourdgs::BytesReadable::new(&bytes);
+        let summary = validate(&mut source, mode, |_, identity| {
+            identities.push(identity);
+            Ok(())
+        });
+        let Ok(summary) = summary else { panic!("not valid") };
+        assert_eq!(identities, (0..130).collect::<Vec<u32>>(), "each comes once");
+        assert_eq!(summary.declared_gaussian_count, 130);
+    }
+    let (sequence, _) = fourdgs::keyframe_delta_file::decode_indexed(&bytes).unwrap();
+    for k in 0..20 {
+        let chunk = &sequence.chunks[k];
+        let begins = k % 5 == 0;
+        assert_eq!((chunk.t0, chunk.t1, chunk.kind == 0), (k as f64, (k + 1) as f64, begins), "{k}");
+        // Only what moves is stored again.
+        let moving = counts(k).saturating_sub(40) as u32;
+        assert_eq!(chunk.update_count, (!begins).then_some(moving), "{k}");
+        let state = fourdgs::keyframe_delta_file::reconstruct_at(&sequence, &chunk.state, k as f64 + 0.5);
+        let means = at(k).means.concat();
+        assert_eq!(state.centers.len(), means.len());
+        let off = |(found, expected): (&f64, f32)| (found - f64::from(expected)).abs();
+        assert!(state.centers.iter().zip(means).map(off).fold(0.0, f64::max) < 2e-3, "{k}");
+    }
 }
 
 #[cfg(target_os = "linux")]

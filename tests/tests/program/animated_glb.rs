@@ -12,7 +12,7 @@ use serde_json::Value;
 
 use crate::{PROGRAM, trained};
 
-const NODES: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/golden-streams/nodes.l4gs");
+pub(crate) const NODES: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/golden-streams/nodes.l4gs");
 const LIFETIMES: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/golden-streams/lifetimes.l4gs");
 /// Twelve nodes, and one joint that never moves.
 const JOINTS: usize = 13;
@@ -21,13 +21,13 @@ const FPS: f64 = 25.0;
 const ROUNDING: f64 = 2e-6;
 
 /// A program that knows glTF 2.0 and nothing else; no part of it is shared with the writer.
-struct Player {
-    json: Value,
+pub(crate) struct Player {
+    pub(crate) json: Value,
     binary: Vec<u8>,
 }
 
 impl Player {
-    fn open(path: &Path) -> Self {
+    pub(crate) fn open(path: &Path) -> Self {
         let bytes = fs::read(path).unwrap();
         let length = u32::from_le_bytes(bytes[12..16].try_into().unwrap()) as usize;
         let json = serde_json::from_slice(&bytes[20..20 + length]).unwrap();
@@ -46,7 +46,7 @@ impl Player {
         }
     }
 
-    fn attribute(&self, name: &str) -> Option<Vec<f64>> {
+    pub(crate) fn attribute(&self, name: &str) -> Option<Vec<f64>> {
         let accessor = &self.json["meshes"][0]["primitives"][0]["attributes"][name];
         (!accessor.is_null()).then(|| self.numbers(accessor))
     }
@@ -101,7 +101,7 @@ impl Player {
     }
 
     /// Joints and weights of each vertex, from as many sets as there are.
-    fn influences(&self) -> Vec<Vec<(usize, f64)>> {
+    pub(crate) fn influences(&self) -> Vec<Vec<(usize, f64)>> {
         let mut all = vec![Vec::new(); self.positions_at_rest().len()];
         for set in 0.. {
             let Some(joints) = self.attribute(&format!("JOINTS_{set}")) else { break };
@@ -113,11 +113,11 @@ impl Player {
         all
     }
 
-    fn positions_at_rest(&self) -> Vec<DVec3> {
+    pub(crate) fn positions_at_rest(&self) -> Vec<DVec3> {
         self.attribute("POSITION").unwrap().chunks_exact(3).map(DVec3::from_slice).collect()
     }
 
-    fn positions(&self, seconds: f64) -> Vec<DVec3> {
+    pub(crate) fn positions(&self, seconds: f64) -> Vec<DVec3> {
         let matrices = self.joint_matrices(seconds);
         let moved = |(position, influences): (DVec3, Vec<(usize, f64)>)| {
             influences.into_iter().map(|(joint, weight)| matrices[joint].transform_point3(position) * weight).sum()

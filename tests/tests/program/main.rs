@@ -10,6 +10,7 @@ mod kills;
 mod resume;
 mod scene_files;
 mod studies;
+mod take_export;
 mod takes;
 #[cfg(target_os = "linux")]
 mod view;

@@ -2,6 +2,7 @@
 
 mod appended;
 mod damaged;
+mod front;
 mod hidden;
 mod hostile;
 mod whole;

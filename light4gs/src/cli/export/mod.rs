@@ -1,28 +1,37 @@
 //! `export`.
+//!
+//! | file | what |
+//! |---|---|
+//! | `target` | the kind of output that a name asks for |
+//! | `clip` | a scene of one stream |
+//! | `take` | a take: frames and segments, one after the other |
+//! | `skin` | the motion of control nodes as joints |
+//! | `plain` | Gaussians for files of other programs |
 
+mod clip;
+mod plain;
 mod skin;
+mod take;
+mod target;
 
 use std::io::Write;
 use std::ops::RangeInclusive;
 use std::path::{Path, PathBuf};
 
 use clap::Args;
-use light4gs_codec::{GaussianArrays, SceneMeta, StreamInfo, read_stream};
-use light4gs_data::{
-    GaussianPly, GlbOptions, MotionSample, NumberedFiles, write_atomically, write_four_dgs, write_glb, write_ply_zip,
-};
-use light4gs_model::{BuiltInField, STILLNESS};
+use light4gs_codec::take::Take;
+use light4gs_codec::{SceneMeta, StreamInfo, read_stream};
+use light4gs_data::{DataError, write_atomically};
 use light4gs_train::config::DeviceName;
-use light4gs_train::device;
 use light4gs_train::error::TrainError;
-use light4gs_train::evaluation::DecodedScene;
 use light4gs_web::page::{Content, page};
 
-use self::skin::{Distances, NodesMotion};
+use self::target::{FolderOf, Target};
 use super::check_output;
 use super::limits::LimitsArgument;
-use super::limits::most::{MOST_FRAMES, frame_count};
+use super::limits::most::MOST_FRAMES;
 use super::output::say;
+use super::take::is_take_file;
 use super::view::dataset_cameras;
 
 /// Most cameras of each split in a page: enough to choose from, few enough to send.
@@ -32,16 +41,27 @@ const FPS: RangeInclusive<f64> = 1e-3..=1e5;
 
 #[derive(Debug, Args)]
 pub(super) struct Export {
-    /// The .l4gs file.
+    /// The .l4gs file: a scene or a take.
     file: PathBuf,
     /// Folder or file. Folder (no suffix, a slash at the end, or an existing folder): `0000.ply`, `0001.ply`, ...; it must
     /// not hold numbered PLY files of another sequence. .zip: the same PLY files. .ply, .glb (KHR_gaussian_splatting): a
     /// single time. .4dgs: the whole motion. A .glb of control nodes has the whole motion too (skin and animation), unless
-    /// --time asks for a single time.
+    /// --time asks for a single time. A take is a .glb for each segment (--to glb), or a single time (--at, --base).
     #[arg(long, required_unless_present = "html")]
     out: Option<PathBuf>,
+    /// What a folder holds. ply: a file for each frame. glb, of a take: a file for each segment, with its motion and what
+    /// stands still around it; `base.glb`, what stands still over the whole take; and `segments.json`, when each is shown.
+    #[arg(long, value_enum, value_name = "KIND", default_value = "ply")]
+    to: FolderOf,
+    /// A single time of a take in seconds, for a .ply or .glb file.
+    #[arg(long, value_name = "SECONDS", allow_negative_numbers = true, conflicts_with_all = ["frames", "fps", "time"])]
+    at: Option<f64>,
+    /// What stands still over the whole take, for a .ply or .glb file. The first bytes of the take are enough: its index and its
+    /// base.
+    #[arg(long, conflicts_with_all = ["frames", "fps", "time", "at"])]
+    base: bool,
     /// One file that plays the scene in a browser without any other file.
-    #[arg(long, value_name = "FILE", conflicts_with_all = ["out", "frames", "device", "time", "fps", "z_up", "limits"])]
+    #[arg(long, value_name = "FILE", conflicts_with_all = ["out", "frames", "device", "time", "fps", "z_up", "limits", "at", "base"])]
     html: Option<PathBuf>,
     /// Dataset whose cameras the page offers; by default that of the run whose folder holds the file.
     #[arg(long, requires = "html")]
@@ -52,7 +72,8 @@ pub(super) struct Export {
     /// A single time, in [0, 1], for a .ply or .glb file; 0 where one is needed and none is given.
     #[arg(long, allow_negative_numbers = true, conflicts_with_all = ["frames", "fps"])]
     time: Option<f32>,
-    /// Frames a second of a .4dgs or of a .glb that moves; by default those of the source, or 30.
+    /// Frames a second of a .4dgs or of a .glb that moves, and of the PLY files of a take; by default those of the source, or
+    /// 30.
     #[arg(long, allow_negative_numbers = true)]
     fps: Option<f32>,
     /// In a .glb: the scene's z axis points up, as in Blender. glTF's y axis does.
@@ -63,37 +84,6 @@ pub(super) struct Export {
     device: DeviceName,
     #[command(flatten)]
     limits: LimitsArgument,
-}
-
-/// The kind of output.
-#[derive(Clone, Copy, Debug)]
-enum Target {
-    PlySequence,
-    PlyZip,
-    Ply,
-    Glb,
-    FourDgs,
-}
-
-impl Target {
-    /// The kind of output for a path: a folder if it exists as one, ends with a slash or has no suffix.
-    fn of(path: &Path) -> Result<Self, TrainError> {
-        let asks_for_folder = path.as_os_str().to_string_lossy().ends_with(std::path::is_separator);
-        let Some(suffix) = path.extension().filter(|_| !asks_for_folder && !path.is_dir()) else {
-            return Ok(Self::PlySequence);
-        };
-        match suffix.to_string_lossy().to_ascii_lowercase().as_str() {
-            "ply" => Ok(Self::Ply),
-            "zip" => Ok(Self::PlyZip),
-            "glb" => Ok(Self::Glb),
-            "4dgs" => Ok(Self::FourDgs),
-            other => Err(TrainError::Input(format!(
-                "--out {}: no file of the kind `.{other}` is written, only .ply, .zip, .glb and .4dgs; for a folder of PLY files put a \
-                 slash at the end of the name",
-                path.display()
-            ))),
-        }
-    }
 }
 
 impl Export {
@@ -110,80 +100,53 @@ impl Export {
 
     fn write_page(&self, html: &Path) -> Result<(), TrainError> {
         check_output(html, &self.file)?;
-        let (scene, StreamInfo { meta: SceneMeta { name, .. }, .. }) =
-            read_stream(&self.file, &light4gs_web::limits())?;
+        let (scene, name) = if is_take_file(&self.file) { self.whole_take()? } else { self.whole_scene()? };
         let cameras = dataset_cameras(&self.file, self.scene.as_deref(), MOST_CAMERAS)?;
-        let title = if name.is_empty() { "Scene" } else { &name };
+        let title = match name.as_str() {
+            "" => "Scene",
+            name => name,
+        };
         let page = page(title, Content::Embedded { scene: &scene, cameras: &cameras }, None);
         write_atomically(html, |file| file.write_all(page.as_bytes()))?;
         say(format_args!("wrote {} ({:.2} MB)", html.display(), page.len() as f64 / 1e6))
     }
 
+    /// The bytes of a scene, and its name.
+    fn whole_scene(&self) -> Result<(Vec<u8>, String), TrainError> {
+        let (scene, StreamInfo { meta: SceneMeta { name, .. }, .. }) =
+            read_stream(&self.file, &light4gs_web::limits())?;
+        Ok((scene, name))
+    }
+
+    /// The bytes of a take, and its name. A page is read as a whole, so it may be no longer than a scene.
+    fn whole_take(&self) -> Result<(Vec<u8>, String), TrainError> {
+        let file = &self.file;
+        let limits = light4gs_web::limits();
+        let take = Take::open(file, &limits)?;
+        let bytes = std::fs::read(file).map_err(DataError::io("read", file))?;
+        if bytes.len() as u64 > limits.file_bytes {
+            return Err(TrainError::Input(format!(
+                "{} has {} bytes, and a page holds at most {}; `light4gs view` plays longer takes, and so does a page that loads \
+                 the file from a server",
+                file.display(),
+                bytes.len(),
+                limits.file_bytes
+            )));
+        }
+        Ok((bytes, take.meta().name.clone()))
+    }
+
     fn export(&self, path: &Path) -> Result<(), TrainError> {
-        let target = Target::of(path)?;
-        if !matches!(target, Target::PlySequence) {
+        let target = Target::of(path, self.to)?;
+        if !target.is_folder() {
             check_output(path, &self.file)?;
         }
-        let decoded: DecodedScene =
-            DecodedScene::open_with_limits(&self.file, &self.limits.get(), &device::open(self.device)?)?;
-        let at = |time: f32| plain_gaussians(decoded.model.at(time).to_arrays());
-        let meta = &decoded.data.meta;
-        let frames = frame_count(meta, self.frames)?;
-        let times = || (0..frames).map(|k| if frames == 1 { 0.0 } else { k as f32 / (frames - 1) as f32 });
-        let out = path.display();
-        let gaussians = &decoded.data.gaussians;
-        let single_time = self.time.unwrap_or(0.0);
-        match target {
-            Target::PlySequence => {
-                let names = NumberedFiles::new(frames as usize, "ply");
-                names.open_folder(path)?;
-                for (k, time) in times().enumerate() {
-                    at(time).write(&path.join(names.name(k)))?;
-                }
-                say(format_args!("wrote {frames} PLY files to {out}"))
-            }
-            Target::PlyZip => {
-                write_ply_zip(path, times().map(at))?;
-                say(format_args!("wrote {out} ({frames} PLY files)"))
-            }
-            Target::Ply => {
-                at(single_time).write(path)?;
-                say(format_args!("wrote {out}"))
-            }
-            Target::Glb => {
-                let options = GlbOptions { sh_degree: gaussians.sh_degree, z_is_up: self.z_up };
-                let nodes = match &decoded.model.field {
-                    BuiltInField::Nodes(nodes) if self.time.is_none() => nodes,
-                    _ => {
-                        write_glb(path, &at(single_time), None, &options)?;
-                        return say(format_args!("wrote {out}{}", left_out(gaussians, &[])));
-                    }
-                };
-                let motion = NodesMotion { scene: &decoded.model, nodes, keyframes: frames, fps: self.fps(meta)? };
-                let skin = motion.skin()?;
-                write_glb(path, &plain_gaussians(gaussians.clone()), Some(&skin), &options)?;
-                let (joints, seconds) = (skin.joints(), skin.duration());
-                let Distances { mean, largest } = motion.distances(&skin);
-                let left_out = left_out(gaussians, &[STILLNESS]);
-                say(format_args!(
-                    "wrote {out} ({joints} joints, {frames} keyframes in {seconds:.2} s; centers are off by {mean:.5} in \
-                     the mean, by {largest:.5} at most){left_out}"
-                ))
-            }
-            Target::FourDgs => {
-                let fps = self.fps(meta)?;
-                let sample = |(k, time): (usize, f32)| MotionSample { begin: k as f64 / fps, gaussians: at(time) };
-                let samples: Vec<MotionSample> = times().enumerate().map(sample).collect();
-                write_four_dgs(path, &samples, f64::from(frames) / fps)?;
-                let left_out = left_out(gaussians, &[]);
-                say(format_args!("wrote {out} ({frames} samples, {fps} a second){left_out}"))
-            }
-        }
+        if is_take_file(&self.file) { self.export_take(path, target) } else { self.export_clip(path, target) }
     }
 
     /// Frames a second: as requested, or those of the source, or 30.
-    fn fps(&self, meta: &SceneMeta) -> Result<f64, TrainError> {
-        let source = Some(meta.fps).filter(|fps| *fps > 0.0);
+    fn fps(&self, source: f32) -> Result<f64, TrainError> {
+        let source = Some(source).filter(|fps| *fps > 0.0);
         let fps = f64::from(self.fps.or(source).unwrap_or(30.0));
         let (least, most) = (FPS.start(), FPS.end());
         match self.fps {
@@ -193,43 +156,5 @@ impl Export {
                 "the file says that it has {fps} frames a second, expected {least} to {most}; give a number with --fps"
             ))),
         }
-    }
-}
-
-/// A text with the attributes that a file of another program cannot hold: all but the `held` ones.
-fn left_out(gaussians: &GaussianArrays, held: &[&str]) -> String {
-    let names = gaussians.further.iter().map(|attribute| attribute.name.as_str());
-    let names: Vec<&str> = names.filter(|name| !held.contains(name)).collect();
-    if names.is_empty() { String::new() } else { format!(", without the attributes {}", names.join(", ")) }
-}
-
-/// Gaussians for files of other programs, with harmonics of degree 3. A further attribute becomes properties `NAME_0`,
-/// `NAME_1`...
-fn plain_gaussians(arrays: GaussianArrays) -> GaussianPly {
-    let per_gaussian = if arrays.is_empty() { 0 } else { arrays.sh_rest.len() / (3 * arrays.len()) };
-    let rest = |i: usize| {
-        std::array::from_fn(|coefficient| {
-            if coefficient >= per_gaussian {
-                return [0.0; 3];
-            }
-            let at = 3 * (i * per_gaussian + coefficient);
-            [arrays.sh_rest[at], arrays.sh_rest[at + 1], arrays.sh_rest[at + 2]]
-        })
-    };
-    let further = arrays.further.iter().flat_map(|attribute| {
-        let column = move |channel: usize| {
-            let values = attribute.values.iter().skip(channel).step_by(attribute.width as usize);
-            (format!("{}_{channel}", attribute.name), values.copied().collect())
-        };
-        (0..attribute.width as usize).map(column)
-    });
-    GaussianPly {
-        further: further.collect(),
-        sh_rest: (0..arrays.means.len()).map(rest).collect(),
-        means: arrays.means,
-        sh_dc: arrays.sh_dc,
-        opacity_logits: arrays.opacity_logits,
-        log_scales: arrays.log_scales,
-        quats: arrays.quats,
     }
 }

@@ -1,5 +1,7 @@
 //! The motion of control nodes as other programs have it: joints, keyframes and weights.
 
+use std::fmt;
+
 use burn::tensor::Tensor;
 use light4gs_data::{Influence, Joint, JointPose, Skin};
 use light4gs_model::{DynamicScene, NodesField, STILLNESS};
@@ -16,14 +18,13 @@ pub(super) struct NodesMotion<'a> {
     pub(super) keyframes: u32,
     /// Keyframes a second.
     pub(super) fps: f64,
+    /// The time of a keyframe, in [0, 1]; with fractions between keyframes.
+    pub(super) time: &'a dyn Fn(f32) -> f32,
+    /// Gaussians of the file before those of the scene, which never move.
+    pub(super) standing: usize,
 }
 
 impl NodesMotion<'_> {
-    /// The time of a keyframe, in [0, 1]; with fractions between keyframes.
-    fn time(&self, keyframe: f32) -> f32 {
-        if self.keyframes == 1 { 0.0 } else { keyframe / (self.keyframes - 1) as f32 }
-    }
-
     /// A joint for each node, and one that never moves if Gaussians may stand still.
     ///
     /// # Errors
@@ -32,54 +33,74 @@ impl NodesMotion<'_> {
         let joint = |anchor| Joint { anchor, poses: Vec::new() };
         let mut joints: Vec<Joint> = rows(self.nodes.world_anchors()).into_iter().map(joint).collect();
         for keyframe in 0..self.keyframes {
-            let time = self.scene.coordinates.field_time(self.time(keyframe as f32));
+            let time = self.scene.coordinates.field_time((self.time)(keyframe as f32));
             let (places, quats) = self.nodes.places(time);
             let poses = rows(places).into_iter().zip(rows(quats));
             for (joint, (position, rotation)) in joints.iter_mut().zip(poses) {
                 joint.poses.push(JointPose { position, rotation });
             }
         }
-        let stands_still = self.scene.gaussians.tensors().further(STILLNESS).is_some();
-        joints.extend(stands_still.then(|| joint([0.0; 3])));
+        let have_stillness = self.scene.gaussians.tensors().further(STILLNESS).is_some();
+        let some_stand = have_stillness || self.standing > 0;
+        joints.extend(some_stand.then(|| joint([0.0; 3])));
         let seconds = (0..self.keyframes).map(|keyframe| (f64::from(keyframe) / self.fps) as f32).collect();
-        Ok(Skin::new(joints, seconds, self.influences(stands_still))?)
+        Ok(Skin::new(joints, seconds, self.influences(have_stillness))?)
     }
 
-    fn influences(&self, stands_still: bool) -> Vec<Influence> {
+    fn influences(&self, have_stillness: bool) -> Vec<Influence> {
         let (count, nodes) = (self.scene.gaussians.len(), self.nodes.nodes());
-        let mut influences = Vec::with_capacity(count);
+        let mut influences = Vec::with_capacity(self.standing + count);
+        if self.standing > 0 {
+            // The joint after those of the nodes.
+            let weights: Vec<f32> = (0..=nodes).map(|joint| if joint == nodes { 1.0 } else { 0.0 }).collect();
+            influences.resize(self.standing, Influence::strongest(&weights));
+        }
         for first in (0..count).step_by(ROWS) {
             let canonical = self.scene.gaussians.tensors().rows(first..count.min(first + ROWS));
             let weights: Vec<f32> = self.nodes.weights(&canonical).into_data().iter().collect();
-            let used = nodes + usize::from(stands_still);
+            let used = nodes + usize::from(have_stillness);
             influences.extend(weights.chunks_exact(nodes + 1).map(|row| Influence::strongest(&row[..used])));
         }
         influences
     }
 
     /// The distances between the Gaussians of a skin and those of the scene, at the keyframes and halfway between them.
-    pub(super) fn distances(&self, skin: &Skin) -> Distances {
-        let at_rest = rows(self.scene.gaussians.means.val());
-        let moments = 2 * self.keyframes - 1;
-        let (mut sum, mut largest) = (0.0, 0.0_f64);
-        for half in 0..moments {
+    pub(super) fn add_distances(&self, skin: &Skin, distances: &mut Distances) {
+        let mut at_rest = vec![[0.0; 3]; self.standing];
+        at_rest.extend(rows::<3>(self.scene.gaussians.means.val()));
+        for half in 0..2 * self.keyframes - 1 {
             let moment = half as f32 / 2.0;
-            let exact: Vec<[f32; 3]> = rows(self.scene.at(self.time(moment)).means);
-            for (found, exact) in skin.positions(&at_rest, moment).into_iter().zip(exact) {
+            let exact: Vec<[f32; 3]> = rows(self.scene.at((self.time)(moment)).means);
+            let found = skin.positions(&at_rest, moment).into_iter().skip(self.standing);
+            for (found, exact) in found.zip(exact) {
                 let square: f32 = found.iter().zip(exact).map(|(found, exact)| (found - exact).powi(2)).sum();
-                let distance = f64::from(square).sqrt();
-                sum += distance;
-                largest = largest.max(distance);
+                distances.add(f64::from(square).sqrt());
             }
         }
-        Distances { mean: sum / (f64::from(moments) * at_rest.len().max(1) as f64), largest }
     }
 }
 
-/// World units.
+/// How far centers are from where they should be, world units.
+#[derive(Debug, Default)]
 pub(super) struct Distances {
-    pub(super) mean: f64,
-    pub(super) largest: f64,
+    sum: f64,
+    count: u64,
+    largest: f64,
+}
+
+impl Distances {
+    fn add(&mut self, distance: f64) {
+        self.sum += distance;
+        self.count += 1;
+        self.largest = self.largest.max(distance);
+    }
+}
+
+impl fmt::Display for Distances {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let mean = self.sum / self.count.max(1) as f64;
+        write!(f, "centers are off by {mean:.5} in the mean, by {:.5} at most", self.largest)
+    }
 }
 
 fn rows<const N: usize>(tensor: Tensor<2>) -> Vec<[f32; N]> {

@@ -227,9 +227,15 @@ pub(super) fn dataset_cameras(file: &Path, named: Option<&Path>, most: usize) ->
     }
     // If the dataset of a run no longer exists, its file can be played all the same.
     let around = file.parent().map(|folder| if folder.as_os_str().is_empty() { Path::new(".") } else { folder });
-    let dataset = around
-        .and_then(|folder| RunFolder::open(folder).ok())
-        .and_then(|(_, record, config)| Scene::open(record.dataset().ok()?, &load_options(&config)).ok());
+    let of_run = |folder: &Path| {
+        let (_, record, config) = RunFolder::open(folder).ok()?;
+        Scene::open(record.dataset().ok()?, &load_options(&config)).ok()
+    };
+    let of_take = |folder: &Path| {
+        let folder = TakeFolder::open(folder).ok()?;
+        Scene::open(&folder.record().scene, &load_options(folder.config())).ok()
+    };
+    let dataset = around.and_then(|folder| of_run(folder).or_else(|| of_take(folder)));
     Ok(dataset.map_or_else(|| "[]".to_owned(), |scene| cameras_json(&scene, most)))
 }
 
