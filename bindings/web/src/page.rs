@@ -25,7 +25,14 @@ pub enum Content<'a> {
         /// Cameras as JSON: a list of objects as the player's `DatasetCamera`; `[]` where there are none.
         cameras: &'a str,
     },
-    /// From addresses.
+    /// From files, as a static server has them.
+    Beside {
+        /// Address of the `.l4gs` file.
+        scene: &'a str,
+        /// Of the cameras.
+        cameras: &'a str,
+    },
+    /// From addresses of a server that knows of a newer scene.
     Served {
         /// Of the `.l4gs` stream.
         scene: &'a str,
@@ -57,6 +64,10 @@ pub fn element(content: Content, place: Place) -> String {
                 "<l4gs-player{page} autoplay loop>\n<script type=\"application/json\">{cameras}</script>\n\
                  <script type=\"application/l4gs\">{scene}</script>\n</l4gs-player>"
             )
+        }
+        Content::Beside { scene, cameras } => {
+            let [scene, cameras] = [scene, cameras].map(escape);
+            format!("<l4gs-player{page} autoplay loop src=\"{scene}\" cameras=\"{cameras}\"></l4gs-player>")
         }
         Content::Served { scene, cameras, watch } => {
             let [scene, cameras, watch] = [scene, cameras, watch].map(escape);
@@ -90,6 +101,32 @@ pub fn page(title: &str, content: Content, script: Option<&str>) -> String {
     page + rest
 }
 
+/// What programs that show a link read of its page: Open Graph.
+#[derive(Clone, Copy, Debug)]
+pub struct Preview<'a> {
+    /// The name of the scene.
+    pub title: &'a str,
+    /// A sentence.
+    pub description: &'a str,
+    /// Address of a picture; most programs want a whole one.
+    pub image: &'a str,
+    /// Its width and height, pixels.
+    pub image_size: [u32; 2],
+}
+
+/// A page whose link is shown with a picture.
+pub fn with_preview(page: &str, preview: &Preview<'_>) -> String {
+    let Preview { title, description, image, image_size: [width, height] } = preview;
+    let [title, description, image] = [title, description, image].map(|text| escape(text));
+    let head = format!(
+        "</title>\n<meta name=\"description\" content=\"{description}\">\n<meta property=\"og:type\" content=\"website\">\n\
+         <meta property=\"og:title\" content=\"{title}\">\n<meta property=\"og:description\" content=\"{description}\">\n\
+         <meta property=\"og:image\" content=\"{image}\">\n<meta property=\"og:image:width\" content=\"{width}\">\n\
+         <meta property=\"og:image:height\" content=\"{height}\">\n<meta name=\"twitter:card\" content=\"summary_large_image\">"
+    );
+    page.replacen("</title>", &head, 1)
+}
+
 /// Text in a form that is safe between tags and in quoted attributes.
 fn escape(text: &str) -> String {
     text.replace('&', "&amp;").replace('<', "&lt;").replace('>', "&gt;").replace('"', "&quot;")
@@ -108,6 +145,21 @@ mod tests {
         assert_eq!(page.matches("<l4gs-player page").count(), 1);
         assert!(page.contains("iUw0R1M=") && page.contains(PLAYER));
         assert_eq!(page.matches("</script>").count(), 3, "the module must not end its own element");
+    }
+
+    #[test]
+    fn a_link_has_a_picture() {
+        let content = Content::Beside { scene: "scene.l4gs", cameras: "cameras.json" };
+        let page = page("a </title>", content, Some("light4gs-player.js"));
+        let preview =
+            Preview { title: "a \"b\"", description: "c", image: "https://x/preview.png", image_size: [640, 480] };
+        let page = with_preview(&page, &preview);
+        assert!(
+            page.contains("content=\"a &quot;b&quot;\"")
+                && page.contains("og:image\" content=\"https://x/preview.png\"")
+        );
+        assert!(page.contains("src=\"scene.l4gs\" cameras=\"cameras.json\"></l4gs-player>"));
+        assert_eq!(page.matches("</title>").count(), 1);
     }
 
     #[test]

@@ -7,9 +7,11 @@
 //! | `take` | a take: frames and segments, one after the other |
 //! | `skin` | the motion of control nodes as joints |
 //! | `plain` | Gaussians for files of other programs |
+//! | `site` | a folder for a static server |
 
 mod clip;
 mod plain;
+mod site;
 mod skin;
 mod take;
 mod target;
@@ -41,13 +43,14 @@ const FPS: RangeInclusive<f64> = 1e-3..=1e5;
 
 #[derive(Debug, Args)]
 pub(super) struct Export {
-    /// The .l4gs file: a scene or a take.
+    /// The .l4gs file, a scene or a take; or the folder of a run or of a take.
+    #[arg(value_name = "FILE|RUN")]
     file: PathBuf,
     /// Folder or file. Folder (no suffix, a slash at the end, or an existing folder): `0000.ply`, `0001.ply`, ...; it must
     /// not hold numbered PLY files of another sequence. .zip: the same PLY files. .ply, .glb (KHR_gaussian_splatting): a
     /// single time. .4dgs: the whole motion. A .glb of control nodes has the whole motion too (skin and animation), unless
     /// --time asks for a single time. A take is a .glb for each segment (--to glb), or a single time (--at, --base).
-    #[arg(long, required_unless_present = "html")]
+    #[arg(long, required_unless_present_any = ["html", "site"])]
     out: Option<PathBuf>,
     /// What a folder holds. ply: a file for each frame. glb, of a take: a file for each segment, with its motion and what
     /// stands still around it; `base.glb`, what stands still over the whole take; and `segments.json`, when each is shown.
@@ -63,8 +66,15 @@ pub(super) struct Export {
     /// One file that plays the scene in a browser without any other file.
     #[arg(long, value_name = "FILE", conflicts_with_all = ["out", "frames", "device", "time", "fps", "z_up", "limits", "at", "base"])]
     html: Option<PathBuf>,
+    /// A folder that any static server shows: the page `index.html`, the player, the file, cameras, and a picture for previews of
+    /// its link.
+    #[arg(long, value_name = "DIR", conflicts_with_all = ["html", "out", "frames", "device", "time", "fps", "z_up", "limits", "at", "base"])]
+    site: Option<PathBuf>,
+    /// The address at which the folder of --site will be: previews of links need whole addresses.
+    #[arg(long, value_name = "ADDRESS", requires = "site")]
+    url: Option<String>,
     /// Dataset whose cameras the page offers; by default that of the run whose folder holds the file.
-    #[arg(long, requires = "html")]
+    #[arg(long, conflicts_with = "out")]
     scene: Option<PathBuf>,
     /// Number of frames over time 0 to 1, keyframes in a .glb; by default as many as the file was made from.
     #[arg(long, value_parser = clap::value_parser!(u32).range(1..=i64::from(MOST_FRAMES)), allow_negative_numbers = true)]
@@ -87,14 +97,18 @@ pub(super) struct Export {
 }
 
 impl Export {
-    pub(super) fn run(self) -> Result<(), TrainError> {
+    pub(super) fn run(mut self) -> Result<(), TrainError> {
+        if self.file.is_dir() {
+            self.file = file_of_run(&self.file)?;
+        }
         if let Some(time) = self.time.filter(|time| !(0.0..=1.0).contains(time)) {
             return Err(TrainError::Input(format!("--time must be in [0, 1], not {time}")));
         }
-        match (&self.html, &self.out) {
-            (Some(html), _) => self.write_page(html),
-            (None, Some(out)) => self.export(out),
-            (None, None) => unreachable!("one of the two is required"),
+        match (&self.html, &self.site, &self.out) {
+            (Some(html), ..) => self.write_page(html),
+            (None, Some(site), _) => self.write_site(site),
+            (None, None, Some(out)) => self.export(out),
+            (None, None, None) => unreachable!("one of the three is required"),
         }
     }
 
@@ -109,6 +123,10 @@ impl Export {
         let page = page(title, Content::Embedded { scene: &scene, cameras: &cameras }, None);
         write_atomically(html, |file| file.write_all(page.as_bytes()))?;
         say(format_args!("wrote {} ({:.2} MB)", html.display(), page.len() as f64 / 1e6))
+    }
+
+    fn write_site(&self, folder: &Path) -> Result<(), TrainError> {
+        site::write(folder, &self.file, self.scene.as_deref(), self.url.as_deref())
     }
 
     /// The bytes of a scene, and its name.
@@ -157,4 +175,16 @@ impl Export {
             ))),
         }
     }
+}
+
+/// The file of a run, or of a take.
+fn file_of_run(folder: &Path) -> Result<PathBuf, TrainError> {
+    let names = ["take.l4gs", "scene.l4gs"].map(|name| folder.join(name));
+    let found = names.into_iter().find(|file| file.is_file());
+    found.ok_or_else(|| {
+        let folder = folder.display();
+        TrainError::Input(format!(
+            "{folder} has neither scene.l4gs nor take.l4gs; name a .l4gs file, or the folder of a run that is finished"
+        ))
+    })
 }

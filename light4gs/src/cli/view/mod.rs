@@ -222,8 +222,16 @@ impl State {
 /// # Errors
 /// A named dataset that cannot be read.
 pub(super) fn dataset_cameras(file: &Path, named: Option<&Path>, most: usize) -> Result<String, TrainError> {
+    Ok(dataset_of(file, named)?.map_or_else(|| "[]".to_owned(), |scene| cameras_json(&scene, most)))
+}
+
+/// A named dataset, else that of the run whose folder holds the file, if it is there.
+///
+/// # Errors
+/// A named dataset that cannot be read.
+pub(super) fn dataset_of(file: &Path, named: Option<&Path>) -> Result<Option<Scene>, TrainError> {
     if let Some(folder) = named {
-        return Ok(cameras_json(&Scene::open(folder, &load_options(&Config::default()))?, most));
+        return Ok(Some(Scene::open(folder, &load_options(&Config::default()))?));
     }
     // If the dataset of a run no longer exists, its file can be played all the same.
     let around = file.parent().map(|folder| if folder.as_os_str().is_empty() { Path::new(".") } else { folder });
@@ -235,8 +243,7 @@ pub(super) fn dataset_cameras(file: &Path, named: Option<&Path>, most: usize) ->
         let folder = TakeFolder::open(folder).ok()?;
         Scene::open(&folder.record().scene, &load_options(folder.config())).ok()
     };
-    let dataset = around.and_then(|folder| of_run(folder).or_else(|| of_take(folder)));
-    Ok(dataset.map_or_else(|| "[]".to_owned(), |scene| cameras_json(&scene, most)))
+    Ok(around.and_then(|folder| of_run(folder).or_else(|| of_take(folder))))
 }
 
 /// Asks the system to show a page. The address has been printed already, so a system without a browser is no error.
