@@ -146,6 +146,18 @@ mod wgpu {
     }
 }
 
+/// The graphics adapters of this machine, those of software drivers included, in the order of `wgpu:0`, `wgpu:1` and so on.
+pub fn adapters() -> Vec<String> {
+    #[cfg(feature = "wgpu")]
+    {
+        use burn::tensor::DeviceType;
+        let name = |device: Device| device.identity().map_or_else(|| "unknown".to_owned(), |identity| identity.name);
+        Device::enumerate(DeviceType::Wgpu).into_iter().map(name).collect()
+    }
+    #[cfg(not(feature = "wgpu"))]
+    Vec::new()
+}
+
 /// Whether a device computes with the processor's own threads, as the caller does.
 pub fn computes_on_processor(device: &Device) -> bool {
     let processors: &[fn() -> Device] = &[

@@ -18,6 +18,7 @@ mod output;
 mod prepare;
 mod quickstart;
 mod render;
+mod report;
 mod signals;
 mod study;
 mod synth;
@@ -95,7 +96,7 @@ enum Command {
     /// Write the Gaussians for other programs: PLY files at successive times, a single time as .ply or .glb, the motion
     /// as .4dgs (of control nodes also as .glb); or write a page that plays the scene.
     #[command(
-        after_help = "Examples:\n  light4gs export bouncing.l4gs --out frames --frames 30\n  light4gs export bouncing.l4gs --html bouncing.html"
+        after_help = "Examples:\n  light4gs export bouncing.l4gs --out frames --frames 30\n  light4gs export runs/bouncing --site bouncing"
     )]
     Export(export::Export),
     /// Write the procedural scene of the quickstart as a D-NeRF dataset.
@@ -126,6 +127,9 @@ enum Command {
     /// Print what differs between runs: program and machine, configuration, results.
     #[command(after_help = "Example:\n  light4gs compare runs/one runs/other")]
     Compare(compare::Compare),
+    /// Print what an issue should say: version, machine, devices, last error. It has no paths and no names of yours.
+    #[command(after_help = "Example:\n  light4gs report")]
+    Report(report::Report),
     /// Time every part of a training step on one or more devices.
     #[command(after_help = "Example:\n  light4gs bench --device ndarray,flex,wgpu --gaussians 20000 --size 400")]
     Bench(bench::Bench),
@@ -168,6 +172,7 @@ impl Cli {
             Command::Extend(command) => command.run(),
             Command::TakeTask(command) => command.run(),
             Command::Compare(command) => command.run(),
+            Command::Report(command) => command.run(),
             Command::Bench(command) => command.run(),
             Command::Completions(command) => command.run(),
             Command::Man(command) => command.run(),
@@ -187,6 +192,7 @@ pub fn main() -> ExitCode {
         Ok(()) => ExitCode::SUCCESS,
         Err(error) => {
             output::tell(format_args!("error: {error}"));
+            report::remember(&error);
             ExitCode::from(error.exit_code())
         }
     }

@@ -9,6 +9,7 @@ mod import_ply;
 mod kills;
 mod resume;
 mod scene_files;
+mod site;
 mod studies;
 mod take_export;
 mod takes;
