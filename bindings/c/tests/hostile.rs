@@ -3,6 +3,7 @@
 
 use std::ffi::{CStr, CString};
 use std::ptr::{null, null_mut};
+use std::time::Duration;
 
 use light4gs_c::*;
 use light4gs_codec::GaussianArrays;
@@ -195,6 +196,28 @@ fn hostile_streams_get_an_answer() {
     println!("{cases} streams of seed {seed}: {opened} opened, {drawn} drawn");
 }
 
+/// A place for a take, on its way to another thread.
+struct Open(*mut L4gsTake);
+
+// SAFETY: the functions may be called from all threads at once.
+unsafe impl Send for Open {}
+// SAFETY: as above.
+unsafe impl Sync for Open {}
+
+impl Open {
+    fn nothing() -> Self {
+        Self(null_mut())
+    }
+
+    fn take(&self) -> *mut L4gsTake {
+        self.0
+    }
+
+    fn place(&mut self) -> *mut *mut L4gsTake {
+        &mut self.0
+    }
+}
+
 /// What a take shows at a time, as the functions of C say.
 fn answer_at(take: *const L4gsTake, seconds: f64) -> Answer {
     // SAFETY: the take is open, all pointers point to room for what is written.
@@ -250,24 +273,25 @@ fn hostile_takes_get_an_error_or_the_right_gaussians() {
     std::fs::create_dir_all(&folder).expect("a folder for the test");
     let path = folder.join("hostile.l4gs");
     let c_path = CString::new(path.to_str().expect("UTF-8")).expect("no zeros");
-    let (mut opened, mut shown, mut most_bytes, mut most_time) = (0u64, 0u64, (0, 0), Default::default());
+    let (mut opened, mut shown, mut most_bytes, mut most_time) = (0u64, 0u64, (0, 0), (Duration::ZERO, 0));
     for case in 0..cases {
         let take = takes.take(case);
         let expected = Reading::of(&take.bytes, &take.times, &decoder).answers;
         let named = || format!("case {case} of seed {seed}, {}", take.kind);
         let mut found = Vec::new();
-        let mut open = null_mut();
+        let from_file = case % 16 == 0;
+        let mut open = Open::nothing();
         let outcome = decoder.watch(|| {
             // SAFETY: the bytes are there, and so is the file.
             let status = unsafe {
-                if case % 16 == 0 {
+                if from_file {
                     std::fs::write(&path, &take.bytes).expect("a file for the test");
-                    l4gs_take_open_file(c_path.as_ptr(), null(), (case % 3) as u32, &mut open)
+                    l4gs_take_open_file(c_path.as_ptr(), null(), (case % 3) as u32, open.place())
                 } else {
-                    l4gs_take_open_bytes(take.bytes.as_ptr(), take.bytes.len(), null(), (case % 3) as u32, &mut open)
+                    l4gs_take_open_bytes(take.bytes.as_ptr(), take.bytes.len(), null(), (case % 3) as u32, open.place())
                 }
             };
-            assert_eq!(status == L4gsStatus::Ok, !open.is_null());
+            assert_eq!(status == L4gsStatus::Ok, !open.take().is_null());
             if status != L4gsStatus::Ok {
                 assert_ne!(status, L4gsStatus::Internal, "{}", text(l4gs_last_error()));
                 found = vec![Answer::Refused(text(l4gs_last_error_kind())); take.times.len()];
@@ -276,15 +300,15 @@ fn hostile_takes_get_an_error_or_the_right_gaussians() {
         });
         assert!(outcome.answer.is_some(), "{}: opening", named());
         let (mut bytes, mut time) = (outcome.bytes, outcome.time);
-        if !open.is_null() {
+        if !open.take().is_null() {
             opened += 1;
             for (&seconds, expected) in take.times.iter().zip(&expected) {
                 let outcome = decoder.watch(|| {
                     // Moving so many takes longer than this has.
                     let large = *expected == Answer::Large;
                     // SAFETY: it is open.
-                    let prepared = large && unsafe { l4gs_take_prepare(open, seconds) } == L4gsStatus::Ok;
-                    found.push(if prepared { Answer::Large } else { answer_at(open, seconds) });
+                    let prepared = large && unsafe { l4gs_take_prepare(open.take(), seconds) } == L4gsStatus::Ok;
+                    found.push(if prepared { Answer::Large } else { answer_at(open.take(), seconds) });
                     Ok(())
                 });
                 assert!(outcome.answer.is_some(), "{}: {seconds} s", named());
@@ -296,16 +320,22 @@ fn hostile_takes_get_an_error_or_the_right_gaussians() {
             if let Some(Answer::Shown(_)) = found.first() {
                 // SAFETY: all pointers point to what the function expects.
                 let status = unsafe {
-                    l4gs_take_render(open, &camera(), take.times[0], null(), image.as_mut_ptr(), image.len())
+                    l4gs_take_render(open.take(), &camera(), take.times[0], null(), image.as_mut_ptr(), image.len())
                 };
                 assert!(matches!(status, L4gsStatus::Ok | L4gsStatus::OverLimit), "{}: {status:?}", named());
                 shown += 1;
             }
             // SAFETY: it is open, and nobody else knows of it.
-            unsafe { l4gs_take_close(open) };
+            unsafe { l4gs_take_close(open.take()) };
         }
-        // The codec, without pointers and without segments that are kept.
-        assert_eq!(found, expected, "{}", named());
+        // The codec, without pointers and without segments that are kept. From a file, the head of a segment is looked at before its
+        // checksum, so another error may come.
+        let same = |(found, expected): (&Answer, &Answer)| match (found, expected) {
+            (Answer::Refused(_), Answer::Refused(_)) if from_file => true,
+            _ => found == expected,
+        };
+        let right = found.len() == expected.len() && found.iter().zip(&expected).all(same);
+        assert!(right, "{}: {found:?}, expected {expected:?}", named());
         let fault = takes.fault(&take, &found, &whole[take.sound]);
         assert!(fault.is_none(), "{}: {fault:?}", named());
         assert!(bytes <= MOST_BYTES_OF_A_TAKE && time <= MOST_TIME, "{}: {bytes} bytes, {time:?}", named());
@@ -441,22 +471,19 @@ fn odd_arguments_for_takes_are_refused() {
 
 #[test]
 fn several_threads_use_one_take() {
-    struct Shared(*mut L4gsTake);
-    // SAFETY: the functions may be called from all threads at once.
-    unsafe impl Sync for Shared {}
     let (path, _) = segments();
-    let mut take = null_mut();
+    let mut open = Open::nothing();
     // SAFETY: every pointer points to what the function expects.
-    assert_eq!(unsafe { l4gs_take_open_file(path.as_ptr(), null(), 1, &mut take) }, L4gsStatus::Ok);
-    let shared = &Shared(take);
+    assert_eq!(unsafe { l4gs_take_open_file(path.as_ptr(), null(), 1, open.place()) }, L4gsStatus::Ok);
+    let open = &open;
     let times = [0.1, 0.6, 0.4, 0.2];
-    let alone = times.map(|seconds| answer_at(shared.0, seconds));
+    let alone = times.map(|seconds| answer_at(open.take(), seconds));
     std::thread::scope(|scope| {
         // One runs ahead, while the others draw; only one segment is kept.
         scope.spawn(move || {
             for round in 0..50 {
                 // SAFETY: it is open.
-                let status = unsafe { l4gs_take_prepare({ shared }.0, times[round % 4]) };
+                let status = unsafe { l4gs_take_prepare(open.take(), times[round % 4]) };
                 assert_eq!(status, L4gsStatus::Ok);
             }
         });
@@ -464,13 +491,13 @@ fn several_threads_use_one_take() {
             let alone = &alone;
             scope.spawn(move || {
                 for round in first..first + 25 {
-                    assert_eq!(answer_at({ shared }.0, times[round % 4]), alone[round % 4]);
+                    assert_eq!(answer_at(open.take(), times[round % 4]), alone[round % 4]);
                 }
             });
         }
     });
     // SAFETY: it is open, and nobody uses it any more.
-    unsafe { l4gs_take_close(take) };
+    unsafe { l4gs_take_close(open.take()) };
 }
 
 #[test]

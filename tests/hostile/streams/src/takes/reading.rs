@@ -1,7 +1,5 @@
 //! What a take shows at some times, as the codec reads it.
 
-use std::time::Duration;
-
 use light4gs_codec::take::{Take, drawn_together};
 use light4gs_codec::{CodecError, Decoded, GaussianArrays, Limits, MotionEvaluator, OpenStream, SceneData};
 
@@ -63,27 +61,30 @@ impl Reading {
     /// Opens the bytes as a take, and reads what it shows at each time. The index and the base are one part that is watched, and
     /// each time is one.
     pub fn of(bytes: &[u8], times: &[f64], decoder: &Decoder) -> Self {
-        let mut opened = None;
+        let (mut take, mut base) = (None, None);
         let mut most = decoder.watch(|| {
-            opened = Some(open(bytes.to_vec())?);
+            let opened = take.insert(Take::read(bytes.to_vec(), &Limits::default())?);
+            base = Some(base_of(opened)?);
             Ok(())
         });
-        let Some((take, base)) = opened else {
-            let kind = most.answer.as_ref().and_then(|answer| answer.as_ref().err()).map_or("panic", CodecError::kind);
-            return Self { answers: vec![Answer::Refused(kind.to_owned()); times.len()], outcome: most };
+        let refusal = |answer: &Option<Result<(), CodecError>>| match answer {
+            Some(Err(error)) => Answer::Refused(error.kind().to_owned()),
+            _ => Answer::Refused("panic".to_owned()),
         };
+        let refused = base.is_none().then(|| refusal(&most.answer));
+        let Some(take) = take else {
+            return Self { answers: vec![refusal(&most.answer); times.len()], outcome: most };
+        };
+        // A base that is refused must not hide what comes after it: a player may have the segment before.
+        let base = base.unwrap_or_default();
         let mut answers = Vec::new();
         for &seconds in times {
-            let mut answer = Answer::Refused("panic".to_owned());
+            let mut shown = None;
             let outcome = decoder.watch(|| {
-                let shown = at(&take, &base, seconds);
-                answer = match &shown {
-                    Ok(shown) => shown.clone(),
-                    Err(error) => Answer::Refused(error.kind().to_owned()),
-                };
-                shown.map(drop)
+                shown = Some(at(&take, &base, seconds)?);
+                Ok(())
             });
-            answers.push(answer);
+            answers.push(refused.clone().or(shown).unwrap_or_else(|| refusal(&outcome.answer)));
             most.bytes = most.bytes.max(outcome.bytes);
             most.time = most.time.max(outcome.time);
             if most.fault().is_none() && !matches!(outcome.answer, Some(Ok(()))) {
@@ -97,24 +98,16 @@ impl Reading {
     pub fn shows(&self) -> bool {
         self.answers.iter().any(|answer| !matches!(answer, Answer::Refused(_)))
     }
-
-    /// The longest time of one part.
-    pub fn time(&self) -> Duration {
-        self.outcome.time
-    }
 }
 
-fn open(bytes: Vec<u8>) -> Result<(Take, GaussianArrays), CodecError> {
-    let take = Take::read(bytes, &Limits::default())?;
-    let (scene, evaluator) = {
-        let stream = take.base()?;
-        let Decoded { scene, info, .. } = OpenStream::with_limits(&stream, &Limits::default())?.decode()?;
-        take.index().check_base(&info)?;
-        let evaluator = MotionEvaluator::new(&scene)?;
-        (scene, evaluator)
-    };
-    drop(evaluator);
-    Ok((take, scene.gaussians))
+/// The Gaussians of the base.
+fn base_of(take: &Take) -> Result<GaussianArrays, CodecError> {
+    let stream = take.base()?;
+    let Decoded { scene, info, .. } = OpenStream::with_limits(&stream, &Limits::default())?.decode()?;
+    take.index().check_base(&info)?;
+    // Refuses attributes that nothing explains.
+    MotionEvaluator::new(&scene)?;
+    Ok(scene.gaussians)
 }
 
 fn at(take: &Take, base: &GaussianArrays, seconds: f64) -> Result<Answer, CodecError> {
