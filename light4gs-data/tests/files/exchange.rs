@@ -384,7 +384,8 @@ fn a_four_dgs_file_is_that_of_the_containers_own_writer() {
     let (frames, duration) = (20usize, 5.0);
     let begin = |k: usize| k as f64 / 4.0;
     let sample = |k: usize| MotionSample { begin: begin(k), anew: false, gaussians: at(k) };
-    write_samples(&path, (0..frames).map(sample), duration).unwrap();
+    let samples = (0..frames).map(sample).map(Ok::<_, light4gs_data::DataError>);
+    write_four_dgs(&path, &at(0), samples, duration).unwrap();
     let theirs = |k: usize| {
         let GaussianPly { means, sh_dc, opacity_logits, log_scales, quats, .. } = at(k);
         let count = means.len();

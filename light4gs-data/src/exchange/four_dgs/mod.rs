@@ -12,7 +12,7 @@
 mod columns;
 mod sequence;
 
-use std::io;
+use std::io::{self, Seek, Write};
 use std::path::Path;
 
 use self::sequence::SequenceWriter;
@@ -48,24 +48,14 @@ pub fn write_four_dgs<E: From<DataError>>(
 ) -> Result<(), E> {
     let mut refused = None;
     let written = write_atomically(path, |file| {
-        let write = || {
-            let mut sequence = SequenceWriter::begin(file, typical, duration)?;
-            for sample in samples {
-                sequence.add(&sample.map_err(Problem::Sample)?)?;
-            }
-            sequence.finish()
+        let problem = match write_samples(file, typical, samples, duration) {
+            Ok(Ok(())) => return Ok(()),
+            Ok(Err(problem)) => problem,
+            Err(Refusal::Io(error)) => return Err(error),
+            Err(Refusal::Reason(reason)) => DataError::field(path, "samples", reason, "write PLY files instead").into(),
         };
-        write().map_err(|problem| {
-            let problem = match problem {
-                Problem::Io(error) => return error,
-                Problem::Sample(error) => error,
-                Problem::Refused(problem) => {
-                    DataError::field(path, "samples", problem, "write PLY files instead").into()
-                }
-            };
-            refused = Some(problem);
-            io::Error::other("the samples were refused")
-        })
+        refused = Some(problem);
+        Err(io::Error::other("the samples were refused"))
     });
     match refused {
         Some(problem) => Err(problem),
@@ -73,22 +63,37 @@ pub fn write_four_dgs<E: From<DataError>>(
     }
 }
 
-/// Why a file is not written.
-enum Problem<E> {
-    Io(io::Error),
-    /// An error of the samples' source.
-    Sample(E),
-    Refused(String),
+/// The inner result is that of the samples' source.
+fn write_samples<E>(
+    file: &mut (impl Write + Seek),
+    typical: &GaussianPly,
+    samples: impl IntoIterator<Item = Result<MotionSample, E>>,
+    duration: f64,
+) -> Result<Result<(), E>, Refusal> {
+    let mut sequence = SequenceWriter::begin(file, typical, duration)?;
+    for sample in samples {
+        match sample {
+            Ok(sample) => sequence.add(&sample)?,
+            Err(problem) => return Ok(Err(problem)),
+        }
+    }
+    sequence.finish().map(Ok)
 }
 
-impl<E> From<io::Error> for Problem<E> {
+/// Why samples are not written.
+enum Refusal {
+    Io(io::Error),
+    Reason(String),
+}
+
+impl From<io::Error> for Refusal {
     fn from(error: io::Error) -> Self {
         Self::Io(error)
     }
 }
 
-impl<E> From<fourdgs::Error> for Problem<E> {
+impl From<fourdgs::Error> for Refusal {
     fn from(error: fourdgs::Error) -> Self {
-        Self::Refused(error.to_string())
+        Self::Reason(error.to_string())
     }
 }

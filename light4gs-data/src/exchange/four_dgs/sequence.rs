@@ -13,7 +13,7 @@ use fourdgs::records::{
 use fourdgs::serialization::crc32;
 
 use super::columns::{Columns, Grid};
-use super::{MotionSample, Problem};
+use super::{MotionSample, Refusal};
 use crate::ply::GaussianPly;
 
 /// Samples from one keyframe to the next.
@@ -53,13 +53,13 @@ pub(super) struct SequenceWriter<'a, W> {
 }
 
 impl<'a, W: Write + Seek> SequenceWriter<'a, W> {
-    pub(super) fn begin<E>(file: &'a mut W, typical: &GaussianPly, duration: f64) -> Result<Self, Problem<E>> {
+    pub(super) fn begin(file: &'a mut W, typical: &GaussianPly, duration: f64) -> Result<Self, Refusal> {
         let grid = Grid::of(typical, duration);
         if !(duration > 0.0 && duration.is_finite()) {
-            return Err(Problem::Refused(format!("they last {duration} seconds, expected a time above 0")));
+            return Err(Refusal::Reason(format!("they last {duration} seconds, expected a time above 0")));
         }
         if !grid.is_usable() {
-            return Err(Problem::Refused("a position or a scale is not finite, or all scales are 0".into()));
+            return Err(Refusal::Reason("a position or a scale is not finite, or all scales are 0".into()));
         }
         let (low, high) = ([f64::INFINITY; 3], [f64::NEG_INFINITY; 3]);
         let (pending, index) = (None, Vec::new());
@@ -89,14 +89,14 @@ impl<'a, W: Write + Seek> SequenceWriter<'a, W> {
     }
 
     /// Adds the next sample, and writes the one before.
-    pub(super) fn add<E>(&mut self, sample: &MotionSample) -> Result<(), Problem<E>> {
+    pub(super) fn add(&mut self, sample: &MotionSample) -> Result<(), Refusal> {
         let MotionSample { begin, anew, gaussians } = sample;
         let previous = self.pending.as_ref().map(|before| before.begin);
         let in_order = previous.map_or(*begin == 0.0, |before| *begin > before);
         if !in_order || *begin >= self.duration {
             let expected = previous.map_or("0 for the first one".into(), |before| format!("more than {before}"));
             let duration = self.duration;
-            return Err(Problem::Refused(format!("t0 is {begin}, expected {expected}, and less than {duration}")));
+            return Err(Refusal::Reason(format!("t0 is {begin}, expected {expected}, and less than {duration}")));
         }
         let before = self.write_pending(*begin)?.filter(|before| !anew && before.columns.len() == gaussians.len());
         let depth = before.as_ref().map_or(0, |before| (before.depth + 1) % KEYFRAME_INTERVAL);
@@ -108,7 +108,7 @@ impl<'a, W: Write + Seek> SequenceWriter<'a, W> {
         let keyframe = &self.index[self.index.len() - usize::from(depth).min(self.index.len())..];
         let birth = keyframe.first().map_or(*begin, |entry| entry.t0);
         let columns = Columns::of(gaussians, &self.grid, birth, first_id);
-        let columns = columns.ok_or_else(|| Problem::Refused(format!("a number at {begin} s is not finite")))?;
+        let columns = columns.ok_or_else(|| Refusal::Reason(format!("a number at {begin} s is not finite")))?;
         let stored = match before.filter(|_| depth > 0) {
             Some(before) => {
                 let (count, streams) = columns.changes(&before.columns)?;
@@ -127,9 +127,9 @@ impl<'a, W: Write + Seek> SequenceWriter<'a, W> {
     }
 
     /// Writes the last sample, the index and the numbers of the head.
-    pub(super) fn finish<E>(mut self) -> Result<(), Problem<E>> {
+    pub(super) fn finish(mut self) -> Result<(), Refusal> {
         if self.write_pending(self.duration)?.is_none() {
-            return Err(Problem::Refused("there are none".into()));
+            return Err(Refusal::Reason("there are none".into()));
         }
         let summary_start = self.length;
         let statistics = Statistics {
@@ -157,7 +157,7 @@ impl<'a, W: Write + Seek> SequenceWriter<'a, W> {
     }
 
     /// Writes the sample that waits for its end, and returns it.
-    fn write_pending<E>(&mut self, end: f64) -> Result<Option<Pending>, Problem<E>> {
+    fn write_pending(&mut self, end: f64) -> Result<Option<Pending>, Refusal> {
         let Some(pending) = self.pending.take() else { return Ok(None) };
         let Pending { begin, columns, depth, stored } = &pending;
         let (at, count) = (self.length, columns.len());

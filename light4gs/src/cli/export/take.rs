@@ -6,7 +6,9 @@ use std::path::Path;
 
 use light4gs_codec::take::{SegmentPlace, Take, TakeIndex, TakeSegment, drawn_together};
 use light4gs_codec::{CodecError, GaussianArrays, Limits, OpenStream, SceneData};
-use light4gs_data::{GlbOptions, MotionSample, NumberedFiles, write_atomically, write_four_dgs, write_glb};
+use light4gs_data::{
+    GaussianPly, GlbOptions, MotionSample, NumberedFiles, write_atomically, write_four_dgs, write_glb,
+};
 use light4gs_model::{BuiltInField, DynamicScene, STILLNESS};
 use light4gs_render::PlayableTake;
 use light4gs_train::device;
@@ -121,7 +123,8 @@ impl Export {
             return self.write_segments(path, &take, &limits);
         }
         let frames = Frames::of(index, self.fps(index.meta().fps)?)?;
-        let at = |frame: usize| Ok(plain_gaussians(take.at(frames.seconds(frame))?));
+        let at =
+            |frame: usize| -> Result<GaussianPly, TrainError> { Ok(plain_gaussians(take.at(frames.seconds(frame))?)) };
         match target {
             Target::PlySequence => write_ply_folder(path, frames.numbers().map(at))?,
             Target::PlyZip => write_ply_archive(path, frames.numbers().map(at))?,
