@@ -22,6 +22,7 @@ import { SplatRenderer } from "./drawing/splat_renderer.js";
  * @property {boolean} [controls]  whether pointer and keys move the camera; true
  * @property {number} [pixelRatio]  pixels of the image for one of the page; at most 2 where not given. A canvas that the page
  *   gives no size keeps its own
+ * @property {SplatRenderer} [renderer]  one of this canvas that was made while the scene was on its way. The player disposes of it
  */
 
 /** Milliseconds of stillness after which a draft is drawn again in full. */
@@ -100,7 +101,7 @@ export class Player extends EventTarget {
     this.following = false;
     /** Red, green, blue in [0, 1]. @type {number[]} */
     this.background = [...scene.info.background];
-    this.renderer = new SplatRenderer(canvas);
+    this.renderer = options.renderer ?? new SplatRenderer(canvas);
     this.#draft = new Draft(scene.info.levels);
     this.#duration = scene.duration;
     this.camera = new Camera();

@@ -25,6 +25,19 @@ test("what is shown comes first, then some seconds ahead, of which two segments 
   assert.deepEqual(begins(keep), [2, 3, 4, 1]);
 });
 
+test("right after a join only the next segment is decoded, and all stay", () => {
+  const long = placesOf([0, 2], [2, 4], [4, 6], [6, 8]);
+  const at = (places, seconds) => {
+    const { decode, keep } = plan(places, seconds, once);
+    return [begins(decode), begins(keep)];
+  };
+  assert.deepEqual(at(long, 2.4), [[2, 4], [2, 4, 6, 0]]);
+  assert.deepEqual(at(long, 2.5), [[2, 4, 6], [2, 4, 6, 0]]);
+  // A quarter of a short one.
+  assert.deepEqual(at(seconds(10), 2.2)[0], [2, 3]);
+  assert.deepEqual(at(seconds(10), 2.25)[0], [2, 3, 4]);
+});
+
 test("what is on the screen is kept in place of what is behind", () => {
   const places = seconds(10);
   assert.deepEqual(begins(plan(places, 6.5, { ...once, held: places[1] }).keep), [6, 7, 8, 1]);

@@ -39,6 +39,10 @@ export type PlayerOptions = {
      * gives no size keeps its own
      */
     pixelRatio?: number;
+    /**
+     * one of this canvas that was made while the scene was on its way. The player disposes of it
+     */
+    renderer?: SplatRenderer;
 };
 /**
  * Plays a scene or a take on a canvas. Events: `timechange`, `statechange` (playing, loop, speed, waiting), `camerachange`, `error`.

@@ -1,6 +1,7 @@
 // Sources of the bytes of a scene: an address, or the page itself.
 
 import { SceneError } from "../errors.js";
+import { fromBase64 } from "./base64.js";
 
 /** How often a connection that breaks is resumed. */
 export const RESUMES = 3;
@@ -119,7 +120,7 @@ export async function download(address, signal, most) {
  */
 export function bytesOf(text) {
   try {
-    return Uint8Array.from(atob(text), (character) => character.charCodeAt(0));
+    return fromBase64(text);
   } catch {
     throw new SceneError("damaged", "the scene in this page is no base64");
   }

@@ -92,6 +92,14 @@ export class SplatRenderer {
     return program;
   }
 
+  /** Has the graphics driver compile what an image in full takes, while there is none. */
+  warm() {
+    const { width, height } = this.canvas;
+    this.setList(new Float32Array(ENTRY * ROW));
+    this.draw({ rotation: [1, 0, 0, 0, 1, 0, 0, 0, 1], translation: [0, 0, 0], fx: 1, fy: 1, cx: 0, cy: 0, width, height }, [0, 0, 0]);
+    this.gl.flush();
+  }
+
   /** @param {Float32Array} list  what is drawn, as {@link import("../scene/scene.js").Scene.frame} gives it */
   setList(list) {
     const { gl, parts } = this;

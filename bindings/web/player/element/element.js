@@ -7,8 +7,10 @@ import { explain } from "./messages.js";
 import { icon, LAYOUT } from "./layout.js";
 import { fillPanel } from "./panel.js";
 import { Player } from "../player.js";
+import { SplatRenderer } from "../drawing/splat_renderer.js";
 import { RemoteFile } from "../bytes/remote_file.js";
 import { MOST_TEXT, bytesOf, download } from "../bytes/sources.js";
+import { decoderModule } from "../scene/connection.js";
 import { dismiss, load, prepare } from "../scene/load.js";
 import { Scene } from "../scene/scene.js";
 import { Take } from "../take/take.js";
@@ -51,6 +53,8 @@ export class L4gsPlayer extends (globalThis.HTMLElement ?? class {}) {
   /** @type {DatasetCamera[]} */
   #cameras = [];
   #loading = 0;
+  /** Made while a scene is on its way: the player's, once there is one. @type {SplatRenderer | null} */
+  #renderer = null;
   /** Ends the work of an element in the page: listening, downloads, and watching an address. */
   #abort = new AbortController();
   #connected = false;
@@ -146,6 +150,7 @@ export class L4gsPlayer extends (globalThis.HTMLElement ?? class {}) {
       }
       report(0);
       const coming = load(new RemoteFile(address, { signal, report }));
+      this.#warm(loading);
       // Without its cameras the scene is not shown.
       list.catch(() => coming.then((unwanted) => unwanted.close(), () => {}));
       const [loaded, known] = await Promise.all([coming, list]);
@@ -181,6 +186,21 @@ export class L4gsPlayer extends (globalThis.HTMLElement ?? class {}) {
   }
 
   /**
+   * Has the graphics card get ready while the decoder waits for bytes. Before, the decoder needs this thread.
+   * @param {number} loading  for what
+   */
+  async #warm(loading) {
+    try {
+      await decoderModule();
+      if (loading !== this.#loading || this.player || this.#renderer) return;
+      this.#renderer = new SplatRenderer(this.canvas);
+      this.#renderer.warm();
+    } catch {
+      // What is wrong is said when the scene is to be shown.
+    }
+  }
+
+  /**
    * Shows a scene: a file, or one that was loaded.
    * @param {import("../scene/load.js").Source | Scene} source
    * @param {{ cameras?: DatasetCamera[], keep?: boolean }} [options]
@@ -204,7 +224,9 @@ export class L4gsPlayer extends (globalThis.HTMLElement ?? class {}) {
       this.#end();
       this.#cameras = cameras;
       const loop = before ? before.loop : this.hasAttribute("loop");
-      this.player = new Player(this.canvas, scene, { cameras, loop, autoplay: playing, time, camera, home });
+      const renderer = this.#renderer ?? undefined;
+      this.#renderer = null;
+      this.player = new Player(this.canvas, scene, { cameras, loop, autoplay: playing, time, camera, home, renderer });
       this.player.speed = speed;
       this.player.following = following;
       if (this.player.controls) this.player.controls.flying = flying;
@@ -233,6 +255,8 @@ export class L4gsPlayer extends (globalThis.HTMLElement ?? class {}) {
   close() {
     this.#loading++;
     this.#end();
+    this.#renderer?.dispose();
+    this.#renderer = null;
     this.layers.show("");
     this.find("bar").hidden = true;
   }

@@ -2,16 +2,19 @@
 
 import wasmBase64 from "virtual:decoder";
 import workerSource from "virtual:worker";
+import { fromBase64 } from "../bytes/base64.js";
 import { SceneError } from "../errors.js";
+
+/** Milliseconds that decoders leave for the first image before they go on. */
+export const FIRST_IMAGE = 200;
 
 /** @type {Promise<WebAssembly.Module> | null} */
 let module = null;
 
 /** The decoder, compiled once a page. */
-function decoderModule() {
+export function decoderModule() {
   const unpack = async () => {
-    const packed = Uint8Array.from(atob(wasmBase64), (character) => character.charCodeAt(0));
-    const stream = new Blob([packed]).stream().pipeThrough(new DecompressionStream("gzip"));
+    const stream = new Blob([fromBase64(wasmBase64)]).stream().pipeThrough(new DecompressionStream("gzip"));
     return WebAssembly.compile(await new Response(stream).arrayBuffer());
   };
   module ??= unpack().catch((error) => {

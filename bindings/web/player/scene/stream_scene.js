@@ -1,10 +1,9 @@
 // A scene: the bytes of a file in, Gaussians at a time out.
 
 import { joined } from "../bytes/joined.js";
+import { FIRST_IMAGE } from "./connection.js";
 import { Scene } from "./scene.js";
 
-/** Milliseconds that the decoder leaves for the first image before it goes on. */
-const FIRST_IMAGE = 200;
 
 /**
  * A decoded scene. Made by {@link import("./load.js").load}; {@link StreamScene.close} frees what it holds. Where its file is still coming, the event

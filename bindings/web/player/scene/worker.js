@@ -1,6 +1,7 @@
 // The worker: one scene or one take, decoded, moved and sorted off the main thread.
 
 import sampleBase64 from "virtual:sample";
+import { fromBase64 } from "../bytes/base64.js";
 import { Decoder } from "./decoder.js";
 import { SceneError } from "../errors.js";
 import { TakeDecoder } from "../take/take_decoder.js";
@@ -54,7 +55,7 @@ const answers = {
   // Browsers compile a function when it is first called. A small scene calls those that every scene needs.
   prepare({ id, module }) {
     decoder = new Decoder(module);
-    decoder.open(Uint8Array.from(atob(sampleBase64), (character) => character.charCodeAt(0)));
+    decoder.open(fromBase64(sampleBase64));
     send({ id });
   },
 

@@ -8,7 +8,7 @@ import { SceneError } from "../errors.js";
 const MOST_KEPT = 2 ** 26;
 
 export class LoadedBytes {
-  /** In the order of their use, the oldest first. @type {Map<Place, Uint8Array>} */
+  /** The oldest first. What was read once is a blob: the browser keeps those outside of the page. @type {Map<Place, Uint8Array<ArrayBuffer> | Blob>} */
   #kept = new Map();
   /** @type {{ place: Place, abort: AbortController } | null} */
   #loading = null;
@@ -35,7 +35,11 @@ export class LoadedBytes {
 
   /** The bytes of a segment that are here. @param {Place} place */
   async read(place) {
-    return this.#kept.get(place) ?? this.file.read(place.first, place.last);
+    const kept = this.#kept.get(place);
+    if (!kept) return this.file.read(place.first, place.last);
+    if (kept instanceof Blob) return new Uint8Array(await kept.arrayBuffer());
+    this.#kept.set(place, new Blob([kept]));
+    return kept;
   }
 
   /**
@@ -69,16 +73,17 @@ export class LoadedBytes {
     );
   }
 
-  /** @param {Place} place @param {Uint8Array} bytes @param {Place[]} needed */
+  /** @param {Place} place @param {Uint8Array<ArrayBuffer>} bytes @param {Place[]} needed */
   #keep(place, bytes, needed) {
     this.#kept.set(place, bytes);
+    const size = (/** @type {Place} */ { first, last }) => last - first;
     let sum = 0;
-    for (const { length } of this.#kept.values()) sum += length;
-    for (const [other, { length }] of this.#kept) {
+    for (const other of this.#kept.keys()) sum += size(other);
+    for (const other of this.#kept.keys()) {
       if (sum <= MOST_KEPT) return;
       if (needed.includes(other)) continue;
       this.#kept.delete(other);
-      sum -= length;
+      sum -= size(other);
     }
   }
 

@@ -14,6 +14,11 @@ const SECONDS_AHEAD = 5;
 const MOST_AHEAD = 16;
 /** Segments that are decoded ahead. */
 const DECODED_AHEAD = 2;
+/**
+ * Seconds after a join in which only the next segment is decoded, and not those behind it: on few cores images would be late, and there is
+ * time for it later. A quarter of the segment, where that is less.
+ */
+const CALM = 0.5;
 /** Segments that are decoded at most: besides those ahead, the one that is shown and one behind. */
 export const MOST_DECODED = DECODED_AHEAD + 2;
 
@@ -47,8 +52,8 @@ export function placeAt(places, seconds) {
  * @param {Place[]} places  in the order of their begins
  * @param {number} seconds
  * @param {{ held?: Place, loop: boolean, duration: number }} options  `held` is on the screen until the segment of the time is there
- * @returns {{ shown: Place | undefined, load: Place[], decode: Place[], keep: Place[] }}  in the order in which they are needed; `keep`
- *   are those that may stay decoded, at most {@link MOST_DECODED}
+ * @returns {{ shown: Place | undefined, load: Place[], decode: Place[], keep: Place[] }}  in the order in which they are needed: those whose
+ *   bytes are loaded, those that are decoded now, and those that may stay decoded, at most {@link MOST_DECODED}
  */
 export function plan(places, seconds, { held, loop, duration }) {
   const shown = placeAt(places, seconds);
@@ -64,8 +69,9 @@ export function plan(places, seconds, { held, loop, duration }) {
     ahead.push(place);
   }
   const load = shown ? [shown, ...ahead] : ahead;
-  const decode = load.slice(0, (shown ? 1 : 0) + DECODED_AHEAD);
+  const near = load.slice(0, (shown ? 1 : 0) + DECODED_AHEAD);
+  const calm = shown && seconds - shown.begin < Math.min(CALM, (shown.end - shown.begin) / 4);
   const behind = held && held !== shown ? held : places[shown ? at - 1 : at];
-  const keep = behind && !decode.includes(behind) ? [...decode, behind] : decode;
-  return { shown, load, decode, keep };
+  const keep = behind && !near.includes(behind) ? [...near, behind] : near;
+  return { shown, load, decode: calm ? near.slice(0, 2) : near, keep };
 }

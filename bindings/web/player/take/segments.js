@@ -1,7 +1,7 @@
 // The segments of a take: loaded in time, decoded by a worker of their own, and forgotten again.
 
 import { SceneError } from "../errors.js";
-import { Connection } from "../scene/connection.js";
+import { Connection, FIRST_IMAGE } from "../scene/connection.js";
 import { LoadedBytes } from "./loaded_bytes.js";
 import { placeAt, plan } from "./plan.js";
 import { lengthOf } from "./read_index.js";
@@ -24,14 +24,16 @@ export class Segments {
   #take;
   /** Decodes, so that the worker that draws need not stop for it. @type {Promise<Connection> | null} */
   #unpacker = null;
-  /** What makes the index known to a worker. */
-  #indexRequest = {};
+  /** What makes the index known to a worker. @type {object | null} */
+  #indexRequest = null;
   #seconds = 0;
   /** @type {{ loop: boolean, held?: Place, duration: number }} */
   #options = { loop: false, duration: 0 };
   #followedAt = -Infinity;
-  /** Whether what comes next is loaded: not before the first image. */
-  ahead = false;
+  /** Whether what comes next is loaded: not before what the first image needs. */
+  #loadsAhead = false;
+  /** Whether it is decoded, too: not before the first image. */
+  #decodesAhead = false;
   /** What is needed at once, one after the other. @type {{ place: Place, resolve: () => void }[]} */
   #needed = [];
   #working = false;
@@ -46,6 +48,9 @@ export class Segments {
     this.#connection = connection;
     this.#take = take;
     this.#bytes = new LoadedBytes(file, () => this.#progress());
+    // It starts while bytes are on their way.
+    this.#unpacker = this.#startUnpacker();
+    this.#unpacker.catch(() => {});
   }
 
   /** The same take, where it has grown. @param {import("./take.js").RangedFile} file */
@@ -66,8 +71,9 @@ export class Segments {
     });
     // They may be well now.
     this.failed.clear();
-    this.#indexRequest = { type: "index", ranges, length: lengthOf({ length }) };
-    this.#unpacker?.then((unpacker) => unpacker.ask(this.#indexRequest)).catch(() => {});
+    const request = { type: "index", ranges, length: lengthOf({ length }) };
+    this.#indexRequest = request;
+    this.#unpacker?.then((unpacker) => unpacker.ask(request)).catch(() => {});
     this.#progress();
   }
 
@@ -80,6 +86,15 @@ export class Segments {
   isSettled(seconds) {
     const place = placeAt(this.places, seconds);
     return !place || this.decoded.has(place.begin) || this.failed.has(place.begin);
+  }
+
+  /** The first image has what it needs: what comes next is loaded, and decoded after a while. */
+  goAhead() {
+    this.#loadsAhead = true;
+    setTimeout(() => {
+      this.#decodesAhead = true;
+      this.#advance();
+    }, FIRST_IMAGE);
   }
 
   /**
@@ -146,9 +161,9 @@ export class Segments {
     if (this.#closed) return;
     const open = (/** @type {Place} */ { begin }) => !this.decoded.has(begin) && !this.failed.has(begin);
     const { load, decode } = this.#plan();
-    this.#bytes.load((this.ahead ? load : load.slice(0, 1)).filter(open), (place, error) => this.#fail(place, error));
+    this.#bytes.load((this.#loadsAhead ? load : load.slice(0, 1)).filter(open), (place, error) => this.#fail(place, error));
     if (this.#working) return;
-    const next = decode.find((place) => open(place) && this.#bytes.has(place));
+    const next = (this.#decodesAhead ? decode : decode.slice(0, 1)).find((place) => open(place) && this.#bytes.has(place));
     if (!next) return;
     this.#working = true;
     this.#decode(next)
@@ -194,9 +209,10 @@ export class Segments {
   }
 
   async #startUnpacker() {
+    const request = this.#indexRequest;
     const unpacker = new Connection();
     await unpacker.prepared;
-    await unpacker.ask(this.#indexRequest);
+    if (request) await unpacker.ask(request);
     return unpacker;
   }
 

@@ -101,7 +101,7 @@ export class Take extends Scene {
     await segment;
     this.removeEventListener("progress", cut);
     this.#file.pause();
-    this.segments.ahead = true;
+    this.segments.goAhead();
     this.decodeMs += milliseconds;
     this.info = info;
     this.#describe();

@@ -1,11 +1,17 @@
 // What the worker does with a take, besides evaluating and drawing.
 
 import { SceneError } from "../errors.js";
+import { MOST_DECODED } from "./plan.js";
 
 /** @typedef {import("../scene/decoder.js").Decoder} Decoder */
 
+/** Bytes of memory that are taken at once, at most. */
+const MOST_RESERVED = 2 ** 26;
+
 export class TakeDecoder {
   #decoder;
+  /** Bytes of memory that the first segment took; 0 once they were taken for the others as well. @type {number | null} */
+  #taken = null;
   /** The level that was evaluated last. */
   #level = 0;
 
@@ -78,11 +84,18 @@ export class TakeDecoder {
    * @returns {{ count: number, levels: number }}
    */
   segment(begin, unpacked) {
+    const { wasm } = this.#decoder;
     this.#decoder.forgetTimes();
-    return this.#decoder.call(() => {
+    // Memory for all that are decoded at a time is taken at once, after the first image, and as much as for one more for gaps. Else it would grow for
+    // a minute and longer, since each segment has another size, and leaves gaps of other sizes.
+    if (this.#taken) wasm.reserve_input(Math.min((MOST_DECODED + 1) * this.#taken, MOST_RESERVED));
+    const before = wasm.memory.buffer.byteLength;
+    const opened = this.#decoder.call(() => {
       this.#decoder.give(unpacked);
-      return this.#decoder.wasm.open_segment(begin);
+      return wasm.open_segment(begin);
     });
+    this.#taken = this.#taken === null ? wasm.memory.buffer.byteLength - before : 0;
+    return opened;
   }
 
   /** @param {number} begin */

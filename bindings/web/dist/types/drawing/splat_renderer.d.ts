@@ -65,6 +65,8 @@ export declare class SplatRenderer {
     constructor(canvas: HTMLCanvasElement | OffscreenCanvas);
     /** Makes everything again after the graphics card has lost it. */
     restore(): void;
+    /** Has the graphics driver compile what an image in full takes, while there is none. */
+    warm(): void;
     /** @param {Float32Array} list  what is drawn, as {@link import("../scene/scene.js").Scene.frame} gives it */
     setList(list: Float32Array): void;
     /**

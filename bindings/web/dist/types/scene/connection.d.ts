@@ -1,3 +1,7 @@
+/** Milliseconds that decoders leave for the first image before they go on. */
+export declare const FIRST_IMAGE = 200;
+/** The decoder, compiled once a page. */
+export declare function decoderModule(): Promise<WebAssembly.Module>;
 /** A worker of its own. It starts at once, and {@link Connection.close} ends it. */
 export declare class Connection {
     #private;

@@ -29,8 +29,8 @@ export declare function placeAt(places: Place[], seconds: number): Place | undef
  * @param {Place[]} places  in the order of their begins
  * @param {number} seconds
  * @param {{ held?: Place, loop: boolean, duration: number }} options  `held` is on the screen until the segment of the time is there
- * @returns {{ shown: Place | undefined, load: Place[], decode: Place[], keep: Place[] }}  in the order in which they are needed; `keep`
- *   are those that may stay decoded, at most {@link MOST_DECODED}
+ * @returns {{ shown: Place | undefined, load: Place[], decode: Place[], keep: Place[] }}  in the order in which they are needed: those whose
+ *   bytes are loaded, those that are decoded now, and those that may stay decoded, at most {@link MOST_DECODED}
  */
 export declare function plan(places: Place[], seconds: number, { held, loop, duration }: {
     held?: Place;

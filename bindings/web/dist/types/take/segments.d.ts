@@ -13,8 +13,6 @@ export declare class Segments {
     }>;
     /** Why a segment cannot be shown, by its begin. @type {Map<number, SceneError>} */
     failed: Map<number, SceneError>;
-    /** Whether what comes next is loaded: not before the first image. */
-    ahead: boolean;
     /**
      * @param {Connection} connection  to the worker that draws
      * @param {import("./take.js").RangedFile} file
@@ -32,6 +30,8 @@ export declare class Segments {
     get loaded(): [number, number][];
     /** Whether nothing more is awaited for a time: its segment is decoded, or cannot be, or there is none. @param {number} seconds */
     isSettled(seconds: number): boolean;
+    /** The first image has what it needs: what comes next is loaded, and decoded after a while. */
+    goAhead(): void;
     /**
      * Says where the time is.
      * @param {number} seconds
