@@ -18,9 +18,10 @@ pub fn to_program_with_gpu() {
         return;
     }
     let Some(program) = std::env::current_exe().ok().and_then(|this| beside(&this)) else { return };
-    if is_of_this_version(&program) {
-        // Returns only if it cannot be started.
-        let _ = Command::new(program).args(std::env::args_os().skip(1)).exec();
+    if is_of_this_version(Command::new(&program)) {
+        // Under our name, for its messages. Returns only if it cannot be started.
+        let name = std::env::args_os().next().unwrap_or_else(|| program.clone().into());
+        let _ = Command::new(program).arg0(name).args(std::env::args_os().skip(1)).exec();
     }
 }
 
@@ -31,8 +32,8 @@ fn beside(this: &Path) -> Option<PathBuf> {
 }
 
 /// Whether a program starts and says that it is of our version. One for another C library, or for a newer one, does not start.
-fn is_of_this_version(program: &Path) -> bool {
-    let printed = Command::new(program).arg("--version").stdin(Stdio::null()).stderr(Stdio::null()).output();
+fn is_of_this_version(mut program: Command) -> bool {
+    let printed = program.arg("--version").stdin(Stdio::null()).stderr(Stdio::null()).output();
     let expected = concat!("light4gs ", env!("CARGO_PKG_VERSION"), "\n");
     printed.is_ok_and(|printed| printed.status.success() && printed.stdout == expected.as_bytes())
 }
@@ -40,34 +41,29 @@ fn is_of_this_version(program: &Path) -> bool {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use std::fs;
-    use std::os::unix::fs::PermissionsExt;
-
-    /// A folder with a `light4gs-gpu` that is this script.
-    fn folder_with(script: &str) -> tempfile::TempDir {
-        let folder = tempfile::tempdir().unwrap();
-        let program = folder.path().join(WITH_GPU);
-        fs::write(&program, script).unwrap();
-        fs::set_permissions(&program, fs::Permissions::from_mode(0o755)).unwrap();
-        folder
-    }
 
     #[test]
     fn only_another_program_is_beside() {
-        let folder = folder_with("");
-        assert_eq!(beside(&folder.path().join("light4gs")), Some(folder.path().join(WITH_GPU)));
-        assert_eq!(beside(&folder.path().join(WITH_GPU)), None, "it would start itself forever");
-        assert_eq!(beside(Path::new("/nowhere/light4gs")), None);
+        let folder = tempfile::tempdir().unwrap();
+        let [this, other] = ["light4gs", WITH_GPU].map(|name| folder.path().join(name));
+        assert_eq!(beside(&this), None, "there is none");
+        std::fs::write(&other, "").unwrap();
+        assert_eq!(beside(&this), Some(other.clone()));
+        assert_eq!(beside(&other), None, "it would start itself forever");
     }
 
     #[test]
     fn only_a_program_that_starts_and_has_our_version_takes_over() {
-        let answers = |script: &str| is_of_this_version(&folder_with(script).path().join(WITH_GPU));
-        let version = env!("CARGO_PKG_VERSION");
-        assert!(answers(&format!("#!/bin/sh\necho light4gs {version}\n")));
-        assert!(!answers("#!/bin/sh\necho light4gs 0.0.1\n"));
-        assert!(!answers(&format!("#!/bin/sh\necho light4gs {version}\nexit 1\n")));
-        // As where the system has another C library: the file is there, and what should load it is not.
-        assert!(!answers(&format!("#!/no/such/loader\necho light4gs {version}\n")));
+        let answers = |script: &str| {
+            let mut shell = Command::new("sh");
+            shell.args(["-c", script]);
+            is_of_this_version(shell)
+        };
+        let ours = concat!("echo light4gs ", env!("CARGO_PKG_VERSION"));
+        assert!(answers(ours));
+        assert!(!answers("echo light4gs 0.0.1"));
+        assert!(!answers(&format!("{ours}; exit 1")));
+        // As where the system has another C library, and nothing loads the program.
+        assert!(!is_of_this_version(Command::new("/no/such/program")));
     }
 }
