@@ -60,10 +60,8 @@ function indexOf(take, bytes) {
 }
 
 /** What a take shows at a time: the checksum of the centers, which activations do not change; null where it is refused. */
-async function centersAt(decoder, take, index, bytes, time, large) {
-  const segment = index.segments.find(([begin, end]) => begin <= time && time < end);
-  if (segment) {
-    const [begin, , from, to] = segment;
+async function centersAt(decoder, take, index, bytes, time, drawn, large) {
+  for (const [begin, , from, to] of index.segments.filter(([begin]) => drawn.includes(begin))) {
     const unpacked = unlessRefused(() => take.unpack(begin, bytes.subarray(from, to)));
     if (!unpacked || !unlessRefused(() => take.segment(begin, unpacked))) return null;
   }
@@ -78,7 +76,7 @@ async function centersAt(decoder, take, index, bytes, time, large) {
     const centers = numbers.subarray(0, 3 * count);
     sum = crc32(new Uint8Array(centers.buffer, centers.byteOffset, centers.byteLength));
   }
-  if (segment) take.forget(segment[0]);
+  for (const begin of drawn) take.forget(begin);
   return sum;
 }
 
@@ -91,9 +89,9 @@ async function check(record, bytes, mostTime) {
   try {
     const index = unlessRefused(() => indexOf(take, bytes));
     const base = index && unlessRefused(() => take.base(bytes.subarray(...index.base)));
-    for (const [time, expected, sum, centers] of record.asked) {
+    for (const [number, [time, expected, sum, centers]] of record.asked.entries()) {
       const before = processorTime();
-      const found = base ? await centersAt(decoder, take, index, bytes, time, expected === "large") : null;
+      const found = base ? await centersAt(decoder, take, index, bytes, time, record.drawn[number], expected === "large") : null;
       mostTime(processorTime() - before);
       shown ||= found !== null;
       if (found === null && expected !== "refused") fault ??= `refuses ${time} s, which the codec shows`;

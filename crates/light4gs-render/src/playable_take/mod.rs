@@ -3,7 +3,7 @@
 #[cfg(test)]
 mod tests;
 
-use std::sync::{Arc, Mutex, PoisonError};
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 use light4gs_codec::{
     CodecError, GaussianArrays, Limits,
@@ -21,8 +21,8 @@ const LEAST_KEPT: usize = 2;
 /// A take: minutes that can be computed and drawn at any time.
 ///
 /// The base is decoded once. Segments are decoded when they are needed, and the last three that were used are kept, or as many
-/// as [`PlayableTake::keeping`] says. All methods take `&self`, and several threads may call them at once; while one of
-/// them decodes a segment, the others wait.
+/// as [`PlayableTake::keeping`] says. All methods take `&self`, and several threads may call them at once, those of
+/// rayon's pool included.
 ///
 /// ```no_run
 /// use light4gs_codec::Limits;
@@ -41,8 +41,33 @@ pub struct PlayableTake {
     base: PlayableScene,
     limits: Limits,
     most: usize,
-    /// Decoded segments by their numbers, the one that was used last at the end.
-    decoded: Mutex<Vec<(usize, Arc<Shown>)>>,
+    kept: Mutex<Kept>,
+}
+
+/// Decoded segments by their numbers, the one that was used last at the end.
+#[derive(Debug, Default)]
+struct Kept(Vec<(usize, Arc<Shown>)>);
+
+impl Kept {
+    /// The segment, which is now the one that was used last.
+    fn take(&mut self, number: usize) -> Option<Arc<Shown>> {
+        let at = self.0.iter().position(|(other, _)| *other == number)?;
+        let entry = self.0.remove(at);
+        let shown = entry.1.clone();
+        self.0.push(entry);
+        Some(shown)
+    }
+
+    /// Keeps a segment, and at most this number in all. Returns that of another thread, where it was faster.
+    fn put(&mut self, number: usize, new: Arc<Shown>, most: usize) -> Arc<Shown> {
+        if let Some(shown) = self.take(number) {
+            return shown;
+        }
+        let surplus = (self.0.len() + 1).saturating_sub(most);
+        self.0.drain(..surplus);
+        self.0.push((number, new.clone()));
+        new
+    }
 }
 
 /// A decoded segment, and what it hides.
@@ -62,7 +87,7 @@ impl PlayableTake {
     pub fn new(take: Take, limits: &Limits) -> Result<Self, CodecError> {
         let base = PlayableScene::decode(&take.base()?, limits).map_err(|error| of_part("base".into(), error))?;
         take.index().check_base(base.info())?;
-        Ok(Self { take, base, limits: *limits, most: KEPT, decoded: Mutex::new(Vec::new()) })
+        Ok(Self { take, base, limits: *limits, most: KEPT, kept: Mutex::default() })
     }
 
     /// A take in memory.
@@ -99,8 +124,7 @@ impl PlayableTake {
 
     /// Numbers of the segments that are decoded, the one that was used last at the end.
     pub fn decoded(&self) -> Vec<usize> {
-        let decoded = self.decoded.lock().unwrap_or_else(PoisonError::into_inner);
-        decoded.iter().map(|(number, _)| *number).collect()
+        self.kept().0.iter().map(|(number, _)| *number).collect()
     }
 
     /// Decodes the segments that are drawn at a time in seconds, so that they are there when they are needed: for a thread that
@@ -167,21 +191,17 @@ impl PlayableTake {
     }
 
     fn decoded_segment(&self, number: usize) -> Result<Arc<Shown>, CodecError> {
-        // Held while a segment is decoded, so that no two threads decode the same one.
-        let mut decoded = self.decoded.lock().unwrap_or_else(PoisonError::into_inner);
-        let found = decoded.iter().position(|(other, _)| *other == number);
-        let entry = match found {
-            Some(at) => decoded.remove(at),
-            None => {
-                // Before the next one is decoded, so that there are never more.
-                let surplus = (decoded.len() + 1).saturating_sub(self.most);
-                decoded.drain(..surplus);
-                (number, Arc::new(self.decode_segment(number)?))
-            }
-        };
-        let shown = entry.1.clone();
-        decoded.push(entry);
-        Ok(shown)
+        if let Some(shown) = self.kept().take(number) {
+            return Ok(shown);
+        }
+        // Not while the list is locked: decoding works in rayon's pool, whose threads may turn to another caller's work, and wait
+        // for the list there. So two threads may decode the same segment at once.
+        let new = Arc::new(self.decode_segment(number)?);
+        Ok(self.kept().put(number, new, self.most))
+    }
+
+    fn kept(&self) -> MutexGuard<'_, Kept> {
+        self.kept.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
     fn decode_segment(&self, number: usize) -> Result<Shown, CodecError> {

@@ -136,6 +136,26 @@ fn a_bounded_number_of_segments_is_kept() {
     assert_eq!(two.decoded(), [0, 1]);
 }
 
+/// A thread that decodes may turn to the work of another one in the same pool: it must not wait for itself.
+#[test]
+fn threads_of_a_pool_may_call_it() {
+    let take = Arc::new(playable().keeping(2));
+    let (done, finished) = std::sync::mpsc::channel();
+    std::thread::spawn(move || {
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(4).build().expect("a pool");
+        for _ in 0..200 {
+            pool.scope(|scope| {
+                for call in 0..32_usize {
+                    let take = take.clone();
+                    scope.spawn(move |_| drop(take.at([0.5, 3.5, 7.0][call % 3]).expect("Gaussians")));
+                }
+            });
+        }
+        done.send(()).expect("somebody waits");
+    });
+    finished.recv_timeout(std::time::Duration::from_secs(120)).expect("no deadlock");
+}
+
 #[test]
 fn wrong_times_and_damage_are_refused() {
     let take = playable();

@@ -4,7 +4,7 @@ use std::collections::BTreeSet;
 use std::io::Write;
 use std::path::Path;
 
-use light4gs_codec::take::{SegmentPlace, Take, TakeIndex, TakeSegment, drawn_together};
+use light4gs_codec::take::{SegmentPart, SegmentPlace, Take, TakeIndex, TakeSegment, drawn_together};
 use light4gs_codec::{CodecError, GaussianArrays, Limits, OpenStream, SceneData};
 use light4gs_data::{
     GaussianPly, GlbOptions, MotionSample, NumberedFiles, write_atomically, write_four_dgs, write_glb,
@@ -209,7 +209,9 @@ impl Export {
             let scene: DynamicScene = DynamicScene::from_arrays(&data, &device)?;
             let name = names.name(number);
             let path = folder.join(&name);
-            let drawn = drawn_together(&still, &hidden, Some(&data.gaussians));
+            // Alone: a file of its own has no other segment to fade into.
+            let alone = |moved| SegmentPart { hidden: &hidden, moved, weight: 1.0 };
+            let drawn = drawn_together(&still, &[alone(&data.gaussians)]);
             let options = GlbOptions { sh_degree: drawn.sh_degree, z_is_up: self.z_up };
             let standing = drawn.len() - data.gaussians.len();
             let keyframes = Keyframes::of(place, fps);
@@ -226,7 +228,7 @@ impl Export {
                 motion.add_distances(&skin, &mut report.distances);
                 report.moving += 1;
             } else {
-                let moment = drawn_together(&still, &hidden, Some(&scene.at(time(0.0)).to_arrays()));
+                let moment = drawn_together(&still, &[alone(&scene.at(time(0.0)).to_arrays())]);
                 write_glb(&path, &plain_gaussians(moment), None, &options)?;
                 report.standing += usize::from(!data.gaussians.is_empty());
             }

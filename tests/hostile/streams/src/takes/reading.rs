@@ -1,6 +1,6 @@
 //! What a take shows at some times, as the codec reads it.
 
-use light4gs_codec::take::{Take, drawn_together};
+use light4gs_codec::take::{DrawnSegment, SegmentPart, Take, drawn_together};
 use light4gs_codec::{CodecError, Decoded, GaussianArrays, Limits, MotionEvaluator, OpenStream, SceneData};
 
 use crate::watch::{Decoder, Outcome};
@@ -111,20 +111,21 @@ fn base_of(take: &Take) -> Result<GaussianArrays, CodecError> {
 }
 
 fn at(take: &Take, base: &GaussianArrays, seconds: f64) -> Result<Answer, CodecError> {
-    let shown = |hidden: &[bool], moved: Option<&GaussianArrays>| {
-        if base.len() > MOST_STILL {
-            return Answer::Large;
+    let mut segments = Vec::new();
+    for DrawnSegment { segment, weight } in take.drawn_at(seconds) {
+        let segment = take.segment(segment)?;
+        let scene: SceneData = OpenStream::with_limits(&segment.stream, &Limits::default())?.decode()?.scene;
+        if scene.gaussians.len() > MOST_MOVED {
+            return Ok(Answer::Large);
         }
-        Answer::Shown(Sums::of(&drawn_together(base, hidden, moved)))
-    };
-    let Some(number) = take.segment_at(seconds) else { return Ok(shown(&[], None)) };
-    let segment = take.segment(number)?;
-    let scene: SceneData = OpenStream::with_limits(&segment.stream, &Limits::default())?.decode()?.scene;
-    if scene.gaussians.len() > MOST_MOVED {
+        let evaluator = MotionEvaluator::new(&scene)?;
+        let mut moved = scene.gaussians.clone();
+        evaluator.apply(&scene.gaussians, segment.times.stream_time(seconds), 0..moved.len(), &mut moved);
+        segments.push((segment.hidden, moved, weight));
+    }
+    if base.len() > MOST_STILL {
         return Ok(Answer::Large);
     }
-    let evaluator = MotionEvaluator::new(&scene)?;
-    let mut moved = scene.gaussians.clone();
-    evaluator.apply(&scene.gaussians, segment.times.stream_time(seconds), 0..moved.len(), &mut moved);
-    Ok(shown(&segment.hidden, Some(&moved)))
+    let parts = segments.iter().map(|(hidden, moved, weight)| SegmentPart { hidden, moved, weight: *weight });
+    Ok(Answer::Shown(Sums::of(&drawn_together(base, &parts.collect::<Vec<_>>()))))
 }
