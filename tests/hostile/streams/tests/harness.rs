@@ -69,6 +69,6 @@ fn a_record_is_a_line_and_the_file() {
     let line = bytes.iter().position(|&byte| byte == b'\n').expect("a line");
     assert!(bytes[line + 1..] == take.bytes);
     let line = String::from_utf8_lossy(&bytes[..line]);
-    let expected = "{\"number\":7,\"kind\":\"sound\",\"sound\":3,\"forged\":false,\"bomb\":false,\"bytes\":505,\"asked\":[[0.0,\"shown\",0,0]]}";
+    let expected = "{\"number\":7,\"kind\":\"sound\",\"sound\":3,\"forged\":false,\"bomb\":false,\"bytes\":505,\"asked\":[[0.0,\"shown\",0,0]],\"drawn\":[[]]}";
     assert_eq!(line, expected);
 }
