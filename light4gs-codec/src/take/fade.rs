@@ -56,7 +56,7 @@ pub(super) fn faded(logit: f32, weight: f32) -> f32 {
         return logit;
     }
     // Written so that NaN becomes the least one.
-    let logit = logit.max(-MOST_LOGIT).min(MOST_LOGIT);
+    let logit = if logit > -MOST_LOGIT { logit.min(MOST_LOGIT) } else { -MOST_LOGIT };
     // -ln(1 - o)
     let density = logarithm(1.0 + exponential(logit));
     logarithm(exponential(weight * density) - 1.0).max(-MOST_LOGIT)

@@ -14,7 +14,9 @@ fn a_site_has_all_that_a_static_server_needs() {
     assert_success(&export(&[]));
     let page = || fs::read_to_string(w.path("site/index.html")).unwrap();
     // Relative addresses: the folder works wherever it is put.
-    for part in ["src=\"scene.l4gs\"", "cameras=\"cameras.json\"", "src=\"light4gs-player.js\"", "content=\"preview.png\""] {
+    for part in
+        ["src=\"scene.l4gs\"", "cameras=\"cameras.json\"", "src=\"light4gs-player.js\"", "content=\"preview.png\""]
+    {
         assert!(page().contains(part), "{part}");
     }
     assert!(fs::read(w.path("site/scene.l4gs")).unwrap() == fs::read(scene).unwrap());
