@@ -122,7 +122,7 @@ fn a_segment_fades_into_the_next_one() {
         assert!(drawn(seconds).is_empty(), "{seconds}");
     }
     let DrawnSegment { weight, .. } = take.drawn_at(2.0_f64.next_up())[1];
-    assert!(weight >= 0.5 && weight < 0.51);
+    assert!((0.5..0.51).contains(&weight));
 }
 
 #[test]
