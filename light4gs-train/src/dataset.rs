@@ -110,6 +110,14 @@ pub fn image_store(config: &Config) -> ImageStore {
     ImageStore::new(&load_options(config), (config.data.memory_limit_mib << 20) as usize)
 }
 
+/// Bytes of images that are kept where each is looked at once.
+const PASSING_BYTES: usize = 16 << 20;
+
+/// The images of a dataset that are looked at once, in their order: of a take of any length, few are in memory.
+pub fn passing_images(config: &Config) -> ImageStore {
+    ImageStore::new(&load_options(config), PASSING_BYTES)
+}
+
 /// The metadata for the file of a scene.
 pub fn scene_meta(config: &Config, data: &Scene) -> SceneMeta {
     let positions = &data.points.positions;

@@ -69,7 +69,10 @@ mod tests {
         let circle = |angle: f32| Vec3::new(4.0 * angle.cos(), 4.0 * angle.sin(), 1.0);
         let around = growth(|time| circle(6.0 * time), 2.0);
         let a_sixth = growth(circle, 2.0);
-        let rig = growth(|time| Vec3::new(4.0, if ((time * 359.0) as usize).is_multiple_of(2) { 2.0 } else { -2.0 }, 1.0), 2.0);
+        let rig = growth(
+            |time| Vec3::new(4.0, if ((time * 359.0) as usize).is_multiple_of(2) { 2.0 } else { -2.0 }, 1.0),
+            2.0,
+        );
         assert!(around > 1.6 && a_sixth > 1.6 && rig < 1.01, "{around}, {a_sixth}, {rig}");
         assert_eq!(growth(circle, 12.0), 1.0);
     }

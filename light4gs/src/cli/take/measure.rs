@@ -9,7 +9,7 @@ use light4gs_data::{Scene, write_atomically};
 use light4gs_render::PlayableTake;
 use light4gs_report::take_page;
 use light4gs_train::config::Config;
-use light4gs_train::dataset::{image_store, load_options};
+use light4gs_train::dataset::{load_options, passing_images};
 use light4gs_train::device;
 use light4gs_train::error::TrainError;
 use light4gs_train::table::{Align, Table};
@@ -56,7 +56,7 @@ fn measured(file: &Path, scene: &Path, config: &Config, limits: &Limits) -> Resu
     let bytes = std::fs::metadata(file).map_err(light4gs_data::DataError::io("read", file))?.len();
     let data = Scene::open(scene, &load_options(config))?;
     let device = device::open(config.device)?;
-    evaluate_take(&take, bytes, &data, &image_store(config), &device)
+    evaluate_take(&take, bytes, &data, &passing_images(config), &device)
 }
 
 fn print(evaluation: &TakeEvaluation, json: bool) -> Result<(), TrainError> {

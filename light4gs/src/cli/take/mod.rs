@@ -9,7 +9,7 @@ use clap::Args;
 use light4gs_data::Scene;
 use light4gs_lab::study::results::is_finished;
 use light4gs_train::config::Config;
-use light4gs_train::dataset::{image_store, load_options};
+use light4gs_train::dataset::{load_options, passing_images};
 use light4gs_train::error::TrainError;
 use light4gs_train::take::{SegmentLength, TakeFolder, TakePlan, cuts};
 
@@ -50,7 +50,7 @@ pub(super) fn train_take(
 pub(super) fn plan_of(config: &Config, scene: &Path, length: SegmentLength) -> Result<TakePlan, TrainError> {
     let data = Scene::open(scene, &load_options(config))?;
     let seconds = seconds_of(&data)?;
-    TakePlan::of(&data, seconds, length, &cuts(&data, &image_store(config))?)
+    TakePlan::of(&data, seconds, length, &cuts(&data, &passing_images(config))?)
 }
 
 /// Goes on with the training of a take, one part after the other.
@@ -145,7 +145,7 @@ impl Extend {
         let mut folder = TakeFolder::open(&self.run)?;
         let data = Scene::open(&self.scene, &load_options(folder.config()))?;
         let seconds = seconds_of(&data)?;
-        let cuts = cuts(&data, &image_store(folder.config()))?;
+        let cuts = cuts(&data, &passing_images(folder.config()))?;
         folder.extend(&self.scene, &data, seconds, &cuts)?;
         train_missing(&folder, &self.launch, self.quiet)
     }

@@ -59,6 +59,10 @@ fn another_picture_is_a_fault() {
     let mut erased = take;
     erased.bytes[128..256].fill(0);
     assert_eq!(takes.fault(&erased, &alone, &whole[1]), None);
+    // A take whose whole front is another's is that one.
+    let mut other = takes.sound(3);
+    other.sound = 1;
+    assert_eq!(takes.fault(&other, &whole[3], &whole[1]), None);
 }
 
 #[test]

@@ -63,6 +63,8 @@ pub struct Takes {
 #[derive(Debug)]
 struct Sound {
     bytes: Vec<u8>,
+    /// Bytes of prelude, first block of the index, and base.
+    front: usize,
     /// The first block of its index.
     block: Range<usize>,
     /// Where the base and each segment begin and end.
@@ -131,7 +133,7 @@ impl Takes {
     /// What is wrong with the answers of a reader, where that can be told from the sound take: `whole` are the answers for that one, at
     /// its times.
     pub fn fault(&self, take: &DamagedTake, answers: &[Answer], whole: &[Answer]) -> Option<&'static str> {
-        if take.forged {
+        if take.forged || self.has_front_of_another(take) {
             return None;
         }
         // The time after the last segment.
@@ -145,6 +147,12 @@ impl Takes {
         };
         let all = answers.len() == whole.len() && answers.iter().zip(whole).all(right);
         (!all).then_some("wrong picture")
+    }
+
+    /// Whether a range of another take has replaced the whole front: then it is that take, and what it shows is right.
+    fn has_front_of_another(&self, take: &DamagedTake) -> bool {
+        let others = self.sound.iter().enumerate().filter(|(index, _)| *index != take.sound);
+        others.map(|(_, other)| &other.bytes[..other.front]).any(|front| take.bytes.starts_with(front))
     }
 
     /// Reads a take, and says what is wrong with the answers. `whole` are those for the sound takes.
@@ -175,10 +183,11 @@ impl Sound {
         let base = take.index().base();
         let meta_bytes = u32::from_le_bytes(*bytes[12..].first_chunk().expect("four bytes")) as usize;
         let block = (parts::PRELUDE + meta_bytes).next_multiple_of(ROW)..base.start as usize;
+        let front = base.end as usize;
         let ranges = take.index().segments().iter().map(|place| place.range()).chain([base]);
         let mut edges: Vec<usize> = ranges.flat_map(|range| [range.start as usize, range.end as usize]).collect();
         edges.sort_unstable();
-        Self { times: times_of(&take), block, edges, bytes }
+        Self { times: times_of(&take), front, block, edges, bytes }
     }
 
     /// Whether a row of the index that was in use has become zeros as a whole.
