@@ -28,7 +28,8 @@ impl Report {
         if let Some(kilobytes) = memory() {
             say(format_args!("memory: {:.1} GiB", kilobytes as f64 / f64::from(1 << 20)))?;
         }
-        say(format_args!("back ends: {}", built_in().join(", ")))?;
+        let back_ends: Vec<&str> = built_in().into_iter().filter(|name| *name != "auto").collect();
+        say(format_args!("back ends: {}", back_ends.join(", ")))?;
         let chosen = device::chosen(DeviceName::Auto);
         let opened = device::open(chosen).map_or_else(|error| error.to_string(), |device| describe(chosen, &device));
         say(format_args!("--device auto: {opened}"))?;

@@ -22,7 +22,7 @@ fn a_site_has_all_that_a_static_server_needs() {
     assert!(fs::read(w.path("site/scene.l4gs")).unwrap() == fs::read(scene).unwrap());
     let picture = fs::read(w.path("site/preview.png")).unwrap();
     let size = [16..20, 20..24].map(|range| u32::from_be_bytes(picture[range].try_into().unwrap()));
-    assert_eq!(size, [1200, 900]);
+    assert_eq!(size, [800, 600]);
 
     assert_success(&export(&["--url", "https://example.org/balls/"]));
     assert!(page().contains("content=\"https://example.org/balls/preview.png\""));

@@ -5,7 +5,7 @@ use std::io::Write;
 use std::path::Path;
 
 use light4gs_codec::{GaussianArrays, Limits};
-use light4gs_data::{Camera, DataError, RgbImage8, RgbImage32, write_atomically};
+use light4gs_data::{Camera, DataError, Frame, RgbImage8, RgbImage32, write_atomically};
 use light4gs_render::{PlayableScene, PlayableTake};
 use light4gs_train::error::TrainError;
 use light4gs_web::page::{Content, PLAYER, Preview, page, with_preview};
@@ -22,8 +22,8 @@ const CAMERAS: &str = "cameras.json";
 const PICTURE: &str = "preview.png";
 /// All files of such a folder, the page last: it names the others.
 const FILES: [&str; 5] = [SCRIPT, SCENE, CAMERAS, PICTURE, PAGE];
-/// Longest side of the picture, pixels: what programs that show links ask for.
-const PICTURE_SIDE: u32 = 1200;
+/// Longest side of the picture, pixels: large enough for programs that show links, and some hundred kilobytes.
+const PICTURE_SIDE: u32 = 800;
 /// Field of view of a camera where no dataset has one, radians.
 const FIELD_OF_VIEW: f32 = 0.8;
 
@@ -31,7 +31,12 @@ const FIELD_OF_VIEW: f32 = 0.8;
 pub(super) fn write(folder: &Path, file: &Path, scene: Option<&Path>, url: Option<&str>) -> Result<(), TrainError> {
     refuse_other_files(folder)?;
     let shown = Shown::open(file)?;
-    let camera = dataset_of(file, scene)?.and_then(|data| data.train.first().map(|frame| frame.camera));
+    // Of the moment that is shown: what one moving camera has filmed looks right from there.
+    let from_middle = |frame: &&Frame| (frame.time - 0.5).abs();
+    let camera = dataset_of(file, scene)?.and_then(|data| {
+        let frames = data.train.iter();
+        frames.min_by(|a, b| from_middle(a).total_cmp(&from_middle(b))).map(|frame| frame.camera)
+    });
     let picture = shown.picture(camera)?;
     let cameras = dataset_cameras(file, scene, MOST_CAMERAS)?;
     let title = if shown.name.is_empty() { "A scene that moves" } else { &shown.name };
