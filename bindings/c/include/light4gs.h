@@ -340,7 +340,7 @@ enum L4gsStatus l4gs_render(const struct L4gsScene *scene,
 // `l4gs_take_close`; otherwise it is null. A file of one scene gets `L4GS_STATUS_NOT_L4GS`, of the kind "not-take"; for
 // `l4gs_open_file` it is the other way round, and the kind is "is-take".
 //
-// `kept` is the most segments that are kept decoded, those that were used last; 0 means three, which are the one that is shown
+// `kept` is the most segments that are kept decoded, those that were used last, and at least two, as two are drawn around a join; 0 means three, which are the one that is shown
 // and those beside it. The file must stay there and may grow; segments that are appended are seen by who opens it again.
 //
 // # Safety
