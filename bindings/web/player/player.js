@@ -116,7 +116,6 @@ export class Player extends EventTarget {
     canvas.addEventListener("webglcontextlost", this.#lost);
     canvas.addEventListener("webglcontextrestored", this.#restored);
     scene.addEventListener("change", this.#more);
-    scene.addEventListener("progress", this.#arrived);
   }
 
   /** More Gaussians of the scene have come, or a take has grown. */
@@ -128,11 +127,6 @@ export class Player extends EventTarget {
     this.#duration = duration;
     // With more Gaussians there are more levels, and other times.
     this.#draft = new Draft(this.scene.info.levels);
-  };
-
-  /** Around a join a take draws two segments, and the second may come while time stands still. */
-  #arrived = () => {
-    if (!this.#playing) this.#shownTime = -1;
   };
 
   #lost = (/** @type {Event} */ event) => event.preventDefault();
@@ -498,7 +492,6 @@ export class Player extends EventTarget {
     for (const observer of this.#observers) observer.disconnect();
     this.controls?.dispose();
     this.scene.removeEventListener("change", this.#more);
-    this.scene.removeEventListener("progress", this.#arrived);
     this.canvas.removeEventListener("webglcontextlost", this.#lost);
     this.canvas.removeEventListener("webglcontextrestored", this.#restored);
     this.renderer.dispose();
