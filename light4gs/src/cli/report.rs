@@ -49,7 +49,8 @@ fn memory() -> Option<u64> {
 
 /// Keeps an error for the next report, without names of the user. What cannot be written is left.
 pub(super) fn remember(error: &TrainError) {
-    let arguments: Vec<String> = env::args().skip(1).collect();
+    let arguments: Vec<String> =
+        env::args_os().skip(1).map(|argument| argument.to_string_lossy().into_owned()).collect();
     let command = arguments.first().filter(|name| !name.starts_with('-')).cloned().unwrap_or_default();
     let text = format!(
         "{command}, exit code {}: {}",

@@ -233,8 +233,8 @@ fn steps_no_finer_than_they_began() {
 }
 
 /// With Burn's own optimizer, on planes that are smooth and resemble each other across scales: the rate falls well
-/// below what the statistics alone give, with noise in every step and a third of the planes used in each. (Measured: to
-/// 0.7 of it, and in 1000 steps to 0.5.)
+/// below what the statistics alone give, with noise in every step and a third of the planes used in each. (Measured: in
+/// 300 steps to 0.7 to 0.87 of it, as other tests of the process reseed the device; in 1000 steps to 0.5.)
 #[test]
 fn training_lowers_the_rate() {
     let device = Device::flex().autodiff();
@@ -262,7 +262,7 @@ fn training_lowers_the_rate() {
     };
     let at_first = values_of(&total(&model, &all_planes()))[0];
     let mut optimizer = AdamConfig::new().init();
-    for step in 0..300 {
+    for step in 0..500 {
         let selection: Vec<usize> = all_planes().into_iter().filter(|plane| (plane + step) % 3 == 0).collect();
         let gradients = GradientsParams::from_grads(total(&model, &selection).backward(), &model);
         model = optimizer.step(5e-3, model, gradients);
