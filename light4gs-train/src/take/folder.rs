@@ -181,8 +181,10 @@ impl TakeFolder {
         config.train.guided_sampling.iterations.clear();
         config.train.losses.photometric.l2_until = 0;
         config.compression.target_bytes = (self.config.compression.target_bytes as f64 * plan.base_share()) as usize;
-        // What moves is missing in it.
+        // What moves is missing in it: its quality says nothing, and all test views of the take would be measured.
         config.compression.target_db = 0.0;
+        config.eval.splits.clear();
+        config.eval.interval = 0;
         config
     }
 
