@@ -11,5 +11,5 @@ fn main() -> std::process::ExitCode {
             std::env::set_var("XDG_RUNTIME_DIR", std::env::temp_dir());
         }
     }
-    light4gs::cli::main()
+    light4gs::cli::Program::default().main()
 }

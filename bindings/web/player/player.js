@@ -4,6 +4,7 @@ import { Camera } from "./views/camera.js";
 import { Controls } from "./views/controls.js";
 import { Draft } from "./views/draft.js";
 import { sourceLens, stand } from "./views/framing.js";
+import { Path } from "./views/path.js";
 import { SplatRenderer } from "./drawing/splat_renderer.js";
 
 /** @typedef {import("./views/camera.js").DatasetCamera} DatasetCamera */
@@ -52,6 +53,8 @@ function isStretched(canvas) {
 export class Player extends EventTarget {
   /** Memory of a list that is not needed any more. @type {ArrayBuffer | null} */
   #spare = null;
+  /** The training cameras over time. */
+  #path;
   #busy = false;
   #dirty = true;
   /** Whether the renderer has a list that was not drawn yet. */
@@ -92,6 +95,7 @@ export class Player extends EventTarget {
     this.canvas = canvas;
     this.scene = scene;
     this.cameras = options.cameras ?? [];
+    this.#path = new Path(this.cameras);
     this.pixelRatio = options.pixelRatio;
     this.loop = options.loop ?? true;
     this.speed = 1;
@@ -252,9 +256,12 @@ export class Player extends EventTarget {
 
   /** The training cameras in the order of their times: the path that {@link following} takes. */
   get path() {
-    return this.cameras
-      .filter(({ split, time }) => (split ?? "train") === "train" && time !== undefined)
-      .sort((a, b) => (a.time ?? 0) - (b.time ?? 0));
+    return this.#path.cameras;
+  }
+
+  /** Whether {@link path} is that of one camera that moves. */
+  get isWay() {
+    return this.#path.isWay;
   }
 
   #tick = (/** @type {number} */ now) => {
@@ -271,6 +278,7 @@ export class Player extends EventTarget {
       this.cameraMoved();
     }
     if (this.following) this.#follow();
+    else this.#followed = undefined;
     this.#update();
     this.#render(now);
   };
@@ -364,20 +372,15 @@ export class Player extends EventTarget {
   }
 
   #follow() {
-    const { path } = this;
-    if (path.length === 0) return;
-    let nearest = path[0];
-    for (const camera of path) {
-      if (Math.abs((camera.time ?? 0) - this.#time) < Math.abs((nearest.time ?? 0) - this.#time)) nearest = camera;
-    }
-    if (nearest === this.#followed) return;
-    this.#followed = nearest;
-    this.#take(nearest);
+    const camera = this.#path.at(this.#time);
+    if (!camera || camera.time === this.#followed) return;
+    this.#followed = camera.time;
+    this.#take(camera);
     this.#change();
   }
 
-  /** @type {DatasetCamera | null} */
-  #followed = null;
+  /** Time of the camera whose place was taken last. @type {number | undefined} */
+  #followed;
 
   /** The viewpoint. */
   #viewpoint() {

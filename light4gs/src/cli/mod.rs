@@ -16,6 +16,7 @@ mod limits;
 mod man;
 mod output;
 mod prepare;
+mod program;
 mod quickstart;
 mod render;
 mod report;
@@ -24,24 +25,24 @@ mod study;
 mod synth;
 mod take;
 mod train;
+mod training;
 mod videos;
 mod view;
 mod wishes;
 
 use std::path::Path;
-use std::process::ExitCode;
 
 use clap::{Parser, Subcommand};
 use light4gs_train::error::TrainError;
 use light4gs_train::run::belongs_to_run;
-use tracing_subscriber::filter::{LevelFilter, Targets};
-use tracing_subscriber::layer::{Layer, SubscriberExt};
-use tracing_subscriber::util::SubscriberInitExt;
+
+pub use program::Program;
+use training::Trainings;
 
 /// Learns a moving scene as 3D Gaussians and their motion, and stores it as one small .l4gs file.
 #[derive(Debug, Parser)]
 #[command(name = "light4gs", version, arg_required_else_help = true)]
-pub struct Cli {
+struct Cli {
     #[command(subcommand)]
     command: Command,
 }
@@ -144,11 +145,8 @@ enum Command {
 }
 
 impl Cli {
-    /// Runs the command.
-    ///
-    /// # Errors
-    /// The error of the command; [`TrainError::exit_code`] is the exit code for it.
-    pub fn run(self) -> Result<(), TrainError> {
+    /// Runs the command. [`TrainError::exit_code`] of its error is the exit code.
+    fn run(self, trainings: &Trainings) -> Result<(), TrainError> {
         match self.command {
             Command::Quickstart(command) => command.run(),
             Command::Prepare(command) => command.run(),
@@ -164,35 +162,17 @@ impl Cli {
             Command::Info(command) => command.run(),
             Command::Export(command) => command.run(),
             Command::Synth(command) => command.run(),
-            Command::Study(command) => command.run(),
+            Command::Study(command) => command.run(trainings),
             Command::Gather(command) => command.run(),
-            Command::StudyTask(command) => command.run(),
+            Command::StudyTask(command) => command.run(trainings),
             Command::Join(command) => command.run(),
             Command::Extend(command) => command.run(),
-            Command::TakeTask(command) => command.run(),
+            Command::TakeTask(command) => command.run(trainings),
             Command::Compare(command) => command.run(),
             Command::Report(command) => command.run(),
             Command::Bench(command) => command.run(),
             Command::Completions(command) => command.run(),
             Command::Man(command) => command.run(),
-        }
-    }
-}
-
-/// Parses the arguments of this process, runs the command, and reports an error on stderr. Exit codes: 0 done, 2 wrong
-/// input, 1 a bug, 75 stopped on request (SIGUSR1).
-pub fn main() -> ExitCode {
-    let wanted = std::env::var("RUST_LOG").ok().and_then(|text| text.parse::<Targets>().ok());
-    let filter = wanted.unwrap_or_else(|| Targets::new().with_default(LevelFilter::WARN));
-    tracing_subscriber::registry()
-        .with(tracing_subscriber::fmt::layer().with_writer(std::io::stderr).with_filter(filter))
-        .init();
-    match gpu_errors::catch(|| Cli::parse().run()) {
-        Ok(()) => ExitCode::SUCCESS,
-        Err(error) => {
-            output::tell(format_args!("error: {error}"));
-            report::remember(&error);
-            ExitCode::from(error.exit_code())
         }
     }
 }

@@ -5,9 +5,9 @@ use std::path::{Path, PathBuf};
 use clap::Args;
 use clap::builder::PossibleValuesParser;
 use light4gs_data::{Layouts, Scene};
-use light4gs_model::BuiltInField;
+use light4gs_model::{BuiltInField, DeformationField};
 use light4gs_report::evaluate_run;
-use light4gs_train::compression::{CodedPart, CodingRecord};
+use light4gs_train::compression::{CodedPart, CodingRecord, EntropyModels};
 use light4gs_train::config::{Config, DeviceName, Overrides};
 use light4gs_train::dataset::{image_store, load_options};
 use light4gs_train::device::{self, describe};
@@ -27,6 +27,7 @@ use super::output::progress::ProgressBars;
 use super::output::{say, say_json, tell};
 use super::signals::stop_flag;
 use super::take::{self, plan_of, train_take};
+use super::training::Training;
 use super::videos;
 use super::wishes::{Wishes, check_quality};
 
@@ -69,7 +70,7 @@ pub(super) struct Train {
     device: Option<DeviceName>,
     #[command(flatten)]
     wishes: Wishes,
-    /// Train a take, for captures of more than about ten seconds: a base that stands still, and segments of this number of
+    /// Train a take, for captures of more than about ten seconds: a base that stands still, and segments of about this number of
     /// seconds, which play as one file. `auto`: two seconds, but at least 45 and at most 90 frames. No segment crosses a cut. The
     /// same command continues after an interruption.
     #[arg(long, value_name = "SECONDS|auto", value_parser = segment_length)]
@@ -178,6 +179,7 @@ pub(super) fn train(
 /// # Errors
 /// [`TrainError::Input`] if the folder holds a run of another configuration or another scene.
 pub(super) fn train_to_evaluation(
+    training: &dyn Training,
     config: Config,
     scene: &Path,
     out: &Path,
@@ -187,7 +189,7 @@ pub(super) fn train_to_evaluation(
     let fresh = !out.join("run.json").exists();
     if fresh {
         let data = check_inputs(&config, scene)?;
-        Trainer::builder(config.clone(), data).check()?;
+        training.check(config.clone(), data)?;
         let folder = RunFolder::create(out, Some(scene), &config, false)?;
         if let Some(like) = like {
             folder.adopt(like, &Scene::open(scene, &load_options(&config))?)?;
@@ -205,10 +207,11 @@ pub(super) fn train_to_evaluation(
     let coded = config.compression.profile.coded().is_some();
     // `bit_maps.json` is the last file that encoding writes.
     if !folder.stream().exists() || (coded && !folder.path("bit_maps.json").exists()) {
-        run(&mut trainer(&config, &folder, &record, output)?.resume()?, output)?;
+        let data = Scene::open(record.dataset()?, &load_options(&config))?;
+        training.train(config.clone(), data, &folder, output)?;
     }
     let scene = Scene::open(record.dataset()?, &load_options(&config))?;
-    evaluate_run::<BuiltInField>(&folder, &config, &scene)
+    training.evaluate(&folder, &config, &scene)
 }
 
 /// Checks what a run needs from its first iteration to its evaluation: the device, the dataset, files for metrics. It
@@ -227,12 +230,23 @@ fn trainer(
     output: &RunOutput,
 ) -> Result<TrainerBuilder, TrainError> {
     let data = Scene::open(record.dataset()?, &load_options(config))?;
-    let bars = ProgressBars::new(output.quiet);
-    Ok(Trainer::builder(config.clone(), data).run_folder(folder.clone()).observer(bars).stop_flag(stop_flag()))
+    Ok(in_folder(Trainer::builder(config.clone(), data), folder, output))
+}
+
+/// A trainer that writes into a run's folder, with progress bars, which stops on request.
+pub(super) fn in_folder<F: DeformationField, E: EntropyModels>(
+    builder: TrainerBuilder<F, E>,
+    folder: &RunFolder,
+    output: &RunOutput,
+) -> TrainerBuilder<F, E> {
+    builder.run_folder(folder.clone()).observer(ProgressBars::new(output.quiet)).stop_flag(stop_flag())
 }
 
 /// Trains to the end, and prints the times of the parts if requested.
-fn run(trainer: &mut Trainer, output: &RunOutput) -> Result<(), TrainError> {
+pub(super) fn run<F: DeformationField, E: EntropyModels>(
+    trainer: &mut Trainer<F, E>,
+    output: &RunOutput,
+) -> Result<(), TrainError> {
     if output.profile {
         trainer.measure_stages();
     }

@@ -30,6 +30,44 @@ fn json(w: &Workspace, path: &str) -> Value {
     serde_json::from_slice(&fs::read(w.path(path)).unwrap()).unwrap()
 }
 
+/// The program under test adds `nothing-moves`. One configuration gives two runs: one of the configured field, and one of a field
+/// that stands still, which the same command does not train again.
+#[test]
+fn a_training_that_another_crate_adds_is_a_row_of_the_table() {
+    let w = Workspace::new(PROGRAM);
+    let text = r#"
+title = "Does it move?"
+reproduces = "nothing"
+outputs = ["table"]
+columns = ["psnr", "bytes"]
+[[axis]]
+name = "field"
+value = [{ name = "configured" }, { name = "still", training = "nothing-moves" }]
+"#;
+    fs::write(w.path("moves.toml"), text).unwrap();
+    fs::write(w.path("unknown.toml"), text.replace("nothing-moves", "all-moves")).unwrap();
+    let refused = run(study(&w, "unknown.toml", &[]));
+    assert_refused(&refused, &["\"still\"", "`training` is \"all-moves\"", "nothing-moves"]);
+    assert!(!w.path("study").exists());
+
+    assert_success(&run(study(&w, "moves.toml", &[])));
+    let planes = |variant: &str| {
+        let evaluation = json(&w, &format!("study/scene/{variant}/seed-0/eval.json"));
+        let sections = evaluation["sections"].as_array().unwrap();
+        let planes = sections.iter().find(|section| section["name"] == "feature_planes").unwrap();
+        planes["bytes"].as_u64().unwrap()
+    };
+    let bytes = [planes("configured"), planes("still")];
+    assert!(bytes[0] > 100 && bytes[1] < 10, "{bytes:?}");
+    let table = fs::read_to_string(w.path("study/table.md")).unwrap();
+    assert!(table.contains("| configured |") && table.contains("| still |"), "{table}");
+
+    let log = || fs::read(w.path("study/scene/still/seed-0/metrics.jsonl")).unwrap();
+    let before = log();
+    assert_success(&run(study(&w, "moves.toml", &[])));
+    assert_eq!(before, log());
+}
+
 #[test]
 fn a_study_from_plan_to_table() {
     let w = Workspace::new(PROGRAM);

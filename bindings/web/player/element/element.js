@@ -215,7 +215,7 @@ export class L4gsPlayer extends (globalThis.HTMLElement ?? class {}) {
       if (loading !== this.#loading) return scene.close();
       const still = matchMedia("(prefers-reduced-motion: reduce)").matches;
       const playing = before ? before.playing : this.hasAttribute("autoplay") && !still && scene.info.moves;
-      const { speed = 1, background, camera, home, following = false } = before ?? {};
+      const { speed = 1, background, camera, home } = before ?? {};
       // Of a take the second stays, of a scene the share of its length.
       const grown = before && scene instanceof Take ? before.scene.duration / scene.duration : 1;
       const time = before ? before.time * grown : undefined;
@@ -228,7 +228,8 @@ export class L4gsPlayer extends (globalThis.HTMLElement ?? class {}) {
       this.#renderer = null;
       this.player = new Player(this.canvas, scene, { cameras, loop, autoplay: playing, time, camera, home, renderer });
       this.player.speed = speed;
-      this.player.following = following;
+      // What a single camera has seen is known from its path only.
+      this.player.following = before?.following ?? (scene instanceof Take && this.player.isWay);
       if (this.player.controls) this.player.controls.flying = flying;
       if (background) this.player.background = background;
       else if (this.getAttribute("background")) this.#setBackground(this.getAttribute("background") ?? "");

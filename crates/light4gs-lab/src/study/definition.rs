@@ -132,6 +132,9 @@ pub struct AxisValue {
     /// Overrides, as for `--set`.
     #[serde(default)]
     pub set: Vec<String>,
+    /// Name of a training that the program has in addition, with parts of its own; see `light4gs::cli::Program`.
+    #[serde(default)]
+    pub training: Option<String>,
     /// Its role in curves.
     #[serde(default)]
     pub role: Role,

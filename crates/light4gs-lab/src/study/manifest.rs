@@ -70,6 +70,9 @@ pub struct ManifestRun {
     pub task: usize,
     /// SHA-256 of the configuration.
     pub configuration: String,
+    /// Name of the program's own training, if it is one.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub training: Option<String>,
 }
 
 /// A study's folder.
@@ -88,6 +91,7 @@ impl Manifest {
             seed: run.seed,
             task: run.task,
             configuration: run.config.digest_text(),
+            training: run.training.clone(),
         };
         let scene =
             |scene: &super::plan::StudyScene| ManifestScene { name: scene.name.clone(), path: scene.path.clone() };
@@ -211,7 +215,8 @@ impl StudyFolder {
             let scene = &wanted.scenes[run.scene];
             let known = found.runs.iter().find(|known| known.name == run.name);
             let other_scene = found.scenes.iter().any(|known| known.name == scene.name && known.path != scene.path);
-            if known.is_some_and(|known| known.configuration != run.configuration) || other_scene {
+            let identity = |run: &ManifestRun| (run.configuration.clone(), run.training.clone());
+            if known.is_some_and(|known| identity(known) != identity(run)) || other_scene {
                 return Err(TrainError::Input(format!(
                     "{root} holds run {} of another configuration or scene; name another folder with --out, or remove it",
                     run.name

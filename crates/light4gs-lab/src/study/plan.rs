@@ -7,7 +7,7 @@ use light4gs_data::DataError;
 use light4gs_train::config::{Config, Overrides};
 use light4gs_train::error::TrainError;
 
-use super::definition::{Axis, DEFAULT_CONFIG, Study, schedule_problem};
+use super::definition::{Axis, DEFAULT_CONFIG, Output, Study, schedule_problem};
 
 /// In the name of a configuration, it stands for the name of the scene.
 const SCENE_PLACE: &str = "{scene}";
@@ -25,6 +25,8 @@ pub struct PlanOptions {
     pub overrides: Vec<String>,
     /// Runs of each variant on each scene, with different seeds. At least 1.
     pub seeds: u64,
+    /// Names of the trainings that the program has in addition, which values of an axis may ask for.
+    pub trainings: Vec<String>,
     /// Folders of other studies, whose trainings are reused.
     pub reuse: Vec<PathBuf>,
     /// The command that asks for the study, for its record; empty if there is none.
@@ -64,6 +66,8 @@ pub struct PlannedRun {
     pub seed: u64,
     /// The complete configuration.
     pub config: Config,
+    /// Name of the program's own training, if it is one.
+    pub training: Option<String>,
     /// Runs of one task differ only in how the file is written. They are trained once, by the first of them.
     pub task: usize,
 }
@@ -102,6 +106,10 @@ impl Plan {
         }
         let variants = variants(&study.axis);
         check_reference(&study, &variants)?;
+        let trainings = variants
+            .iter()
+            .map(|variant| training_of(&study, variant, &options.trainings))
+            .collect::<Result<Vec<_>, _>>()?;
         let scenes = scenes(&options.scenes)?;
         let mut runs: Vec<PlannedRun> = Vec::new();
         let mut tasks = 0;
@@ -110,18 +118,22 @@ impl Plan {
                 .iter()
                 .map(|variant| config_of(&study, variant, &scene.name, options))
                 .collect::<Result<Vec<_>, _>>()?;
-            check_different(&variants, &configs)?;
+            check_different(&variants, &configs, &trainings)?;
             for seed in 0..options.seeds {
                 let first = runs.len();
                 for (variant_index, (variant, config)) in variants.iter().zip(&configs).enumerate() {
                     let mut config = config.clone();
                     config.seed = config.seed.saturating_add(seed);
                     config.validate()?;
-                    let like = runs[first..].iter().find(|earlier| earlier.config.trains_like(&config));
+                    let training = trainings[variant_index].clone();
+                    let alike =
+                        |earlier: &&PlannedRun| earlier.training == training && earlier.config.trains_like(&config);
+                    let like = runs[first..].iter().find(alike);
                     let task = like.map_or(tasks, |earlier| earlier.task);
                     tasks = tasks.max(task + 1);
                     let name = format!("{}/{}/seed-{seed}", scene.name, variant.name);
-                    runs.push(PlannedRun { name, scene: scene_index, variant: variant_index, seed, config, task });
+                    let (scene, variant) = (scene_index, variant_index);
+                    runs.push(PlannedRun { name, scene, variant, seed, config, training, task });
                 }
             }
         }
@@ -188,10 +200,38 @@ fn config_of(study: &Study, variant: &Variant, scene: &str, options: &PlanOption
         .map_err(|error| TrainError::Input(format!("variant \"{}\" of \"{}\": {error}", variant.name, study.title)))
 }
 
+/// The training that a variant's values ask for, which must be one of the program's.
+fn training_of(study: &Study, variant: &Variant, known: &[String]) -> Result<Option<String>, TrainError> {
+    let refuse = |problem: String| {
+        Err(TrainError::Input(format!("variant \"{}\" of \"{}\": {problem}", variant.name, study.title)))
+    };
+    let values = study.axis.iter().zip(&variant.values).map(|(axis, value)| &axis.value[*value]);
+    let asked: Vec<&String> = values.filter_map(|value| value.training.as_ref()).collect();
+    let training = match asked[..] {
+        [] => return Ok(None),
+        [training] => training,
+        _ => return refuse("two of its values ask for a `training`; only one can be made".to_owned()),
+    };
+    if !known.contains(training) {
+        let has = if known.is_empty() { "none".to_owned() } else { known.join(", ") };
+        return refuse(format!(
+            "`training` is \"{training}\", of which this program has {has}; run the study by the program that adds it \
+             (docs/studies.md, \"With a part of your own\")"
+        ));
+    }
+    if study.shows(Output::Primitives) {
+        return refuse(
+            "the output \"primitives\" draws built-in fields only; take it from `outputs`, or `training` away"
+                .to_owned(),
+        );
+    }
+    Ok(Some(training.clone()))
+}
+
 /// Refuses variants that an override has made equal, since nothing would vary between them.
-fn check_different(variants: &[Variant], configs: &[Config]) -> Result<(), TrainError> {
-    for (later, config) in configs.iter().enumerate() {
-        if let Some(earlier) = configs[..later].iter().position(|earlier| earlier == config) {
+fn check_different(variants: &[Variant], configs: &[Config], trainings: &[Option<String>]) -> Result<(), TrainError> {
+    for (later, wanted) in configs.iter().zip(trainings).enumerate() {
+        if let Some(earlier) = configs.iter().zip(trainings).take(later).position(|earlier| earlier == wanted) {
             return Err(TrainError::Input(format!(
                 "variants \"{}\" and \"{}\" have the same configuration: nothing would vary between them. Leave out the \
                  --set that makes them alike, or change their values in the study",
@@ -262,6 +302,7 @@ value = [{ name = "three", label = "degree 3" }, { name = "one", set = ["model.s
             schedule: None,
             overrides: Vec::new(),
             seeds: 1,
+            trainings: vec!["mine".to_owned()],
             reuse: Vec::new(),
             command: String::new(),
         }
@@ -306,6 +347,24 @@ value = [{ name = "three", label = "degree 3" }, { name = "one", set = ["model.s
         assert!(error.contains("--schedule is -1"), "{error}");
     }
 
+    const TRAININGS: &str = r#"
+[[axis]]
+name = "field"
+value = [{ name = "usual" }, { name = "own", training = "mine" }]
+"#;
+
+    /// The same configuration twice, trained in two ways: two tasks.
+    #[test]
+    fn a_training_of_the_programs_own_is_a_task_of_its_own() {
+        let folder = tempfile::tempdir().unwrap();
+        let scene = folder.path().join("scene");
+        std::fs::create_dir(&scene).unwrap();
+        let plan = Plan::new(study(TRAININGS), &options(&scene)).unwrap();
+        assert_eq!(plan.tasks(), 2);
+        let trainings: Vec<_> = plan.runs.iter().map(|run| run.training.as_deref()).collect();
+        assert_eq!(trainings, [None, Some("mine")]);
+    }
+
     #[test]
     fn what_cannot_be_run_is_refused_before_it_begins() {
         let folder = tempfile::tempdir().unwrap();
@@ -317,6 +376,10 @@ value = [{ name = "three", label = "degree 3" }, { name = "one", set = ["model.s
         };
         let good = options(&scene);
         refused(study(LAMBDAS), PlanOptions { seeds: 0, ..good.clone() }, &["--seeds"]);
+        let none = PlanOptions { trainings: Vec::new(), ..good.clone() };
+        refused(study(TRAININGS), none, &["\"own\"", "`training` is \"mine\"", "has none"]);
+        let twice = format!("{TRAININGS}{}", TRAININGS.replace("\"field\"", "\"other\""));
+        refused(study(&twice), good.clone(), &["own+own", "two of its values"]);
         refused(study(LAMBDAS), PlanOptions { scenes: vec![], ..good.clone() }, &["scene"]);
         refused(study(LAMBDAS), PlanOptions { scenes: vec![folder.path().join("no")], ..good.clone() }, &["no"]);
         refused(study(LAMBDAS), PlanOptions { scenes: vec![scene.clone(); 2], ..good.clone() }, &["two scenes"]);

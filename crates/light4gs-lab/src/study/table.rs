@@ -406,7 +406,8 @@ bytes = 2.2e6
                     let run = format!("{}/{name}/seed-{seed}", manifest.scenes[scene].name);
                     let task = manifest.runs.len();
                     let configuration = String::new();
-                    manifest.runs.push(ManifestRun { name: run.clone(), scene, variant, seed, task, configuration });
+                    let (name, training) = (run.clone(), None);
+                    manifest.runs.push(ManifestRun { name, scene, variant, seed, task, configuration, training });
                     match psnr(scene, variant, seed) {
                         Some(psnr) => results.runs.push(result(run, scene, variant, seed, psnr)),
                         None => results.missing.push(MissingRun {

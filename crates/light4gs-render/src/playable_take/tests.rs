@@ -64,11 +64,13 @@ fn playable() -> PlayableTake {
 #[test]
 fn segments_move_by_their_own_times_and_fade_at_the_joins() {
     let take = playable();
-    // (seconds, Gaussians of the base, heights of the segments'): margins are a quarter of each stream.
-    let expected: [(f64, usize, &[f32]); 11] = [
+    // (seconds, Gaussians of the base, heights of the segments'): margins are a quarter of each stream,
+    // and the fade takes a quarter of both.
+    let expected: [(f64, usize, &[f32]); 12] = [
         (0.0, 3, &[0.25]),
         (1.0, 3, &[0.5]),
-        (1.5, 3, &[0.625, 0.125]),
+        (1.5, 3, &[0.625]),
+        (1.875, 3, &[0.71875, 0.21875]),
         (2.0, 3, &[0.75, 0.25]),
         (3.0, 1, &[0.5]),
         (3.5, 1, &[0.625]),
@@ -88,7 +90,7 @@ fn segments_move_by_their_own_times_and_fade_at_the_joins() {
     let hidden = take.at(3.5).expect("Gaussians");
     assert_eq!(hidden.means[0], [0.0, 0.0, 0.0], "the middle one is not hidden");
     // All opacities are equal; a quarter of the way, the later segment has a quarter, and what it hides three quarters.
-    let logits = take.at(1.5).expect("Gaussians").opacity_logits;
+    let logits = take.at(1.875).expect("Gaussians").opacity_logits;
     assert_eq!((logits[1], logits[0], logits[2]), (4.0, logits[3], logits[3]));
     assert!(logits[4] < logits[3] && logits[3] < 4.0, "{logits:?}");
 }
@@ -107,7 +109,7 @@ fn images_are_those_of_the_gaussians_together() {
     let take = playable();
     let (eye, up) = ([0.0, -6.0, 0.0], [0.0, 0.0, 1.0]);
     let camera = Camera::look_at(eye.into(), [0.0; 3].into(), up.into(), 0.9, 65, 65);
-    for seconds in [1.0, 2.25, 3.0, 5.0] {
+    for seconds in [1.0, 2.0625, 3.0, 5.0] {
         let image = take.render(&camera, seconds, [0.1, 0.2, 0.3]).expect("an image");
         // The same Gaussians as one scene.
         let together = SceneData { gaussians: take.at(seconds).expect("Gaussians"), ..SceneData::default() };

@@ -43,7 +43,8 @@ pub(super) fn takes() -> Vec<(&'static str, Vec<u8>)> {
     let meta = TakeMeta { name: "a take 🎾".into(), fps: 29.97, seconds: 1.5, extra };
     let segments = write_take(&meta, &coded, &[second, first.clone()], 2).unwrap();
 
-    // Segments that meet and were appended, one of them by a process that was killed; blocks of 1 and 64 slots.
+    // Segments that meet and were appended, one of them by a process that was killed; blocks of 1 and 64 slots. Of the times that are
+    // asked for, 0.25 is in a fade before its middle, 0.37 in the middle of one.
     let mut base = still(GaussianArrays { sh_degree: 0, sh_rest: Vec::new(), ..clusters(9) });
     base.gaussians.further = vec![further("age", 1, 9)];
     let join = |begin: f64, end: f64, hidden: &[bool]| NewSegment {
@@ -51,14 +52,14 @@ pub(super) fn takes() -> Vec<(&'static str, Vec<u8>)> {
         stream: moving.clone(),
         hidden: hidden.to_vec(),
     };
-    let all = join(0.25, 0.37, &[true; 9]);
+    let all = join(0.26, 0.37, &[true; 9]);
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("appended.l4gs");
     fs::write(&path, write_take(&TakeMeta::default(), &encode(&base).unwrap(), &[], 1).unwrap()).unwrap();
     TakeFile::append(&path, &join(0.37, 2.0, &[false; 9])).unwrap();
     fs::write(&path, [&fs::read(&path).unwrap()[..], b"killed while it wrote"].concat()).unwrap();
     TakeFile::append(&path, &all).unwrap();
-    TakeFile::append(&path, &join(0.0, 0.25, &[])).unwrap();
+    TakeFile::append(&path, &join(0.0, 0.26, &[])).unwrap();
     let appended = fs::read(&path).unwrap();
 
     let empty = encode(&still(GaussianArrays::default())).unwrap();

@@ -24,6 +24,7 @@ pub(super) use task::StudyTask;
 use super::command_line::command_line;
 use super::launch::{LaunchOptions, Launcher, TaskFolder, local, slurm};
 use super::output::{say, say_json};
+use super::training::Trainings;
 
 impl TaskFolder for StudyFolder {
     const TASK: &'static str = "study-task";
@@ -86,7 +87,7 @@ pub(super) struct Study {
 }
 
 impl Study {
-    pub(super) fn run(self) -> Result<(), TrainError> {
+    pub(super) fn run(self, trainings: &Trainings) -> Result<(), TrainError> {
         if self.name == "list" {
             return list();
         }
@@ -94,8 +95,8 @@ impl Study {
         overrides.extend(self.device.map(|device| format!("device={device}")));
         let (config, scenes, schedule) = (self.config, self.scenes, self.schedule);
         let (seeds, reuse) = (self.seeds, self.reuse);
-        let command = command_line();
-        let options = PlanOptions { config, scenes, schedule, overrides, seeds, reuse, command };
+        let (command, trainings) = (command_line(), trainings.names());
+        let options = PlanOptions { config, scenes, schedule, overrides, seeds, trainings, reuse, command };
         let plan = Plan::new(Definition::load(&self.name)?, &options)?;
         for study in &plan.reuse {
             StudyFolder::open(study)?;
@@ -152,8 +153,8 @@ fn dry_run(plan: &Plan, selection: &Selection, out: Option<PathBuf>, json: bool)
             _ => "to do",
         };
         let train = &run.config.train;
-        let first = trained.insert(run.task);
-        let reused = first && find_trained(&plan.reuse, &plan.scenes[run.scene].path, &run.config)?.is_some();
+        let (first, scene) = (trained.insert(run.task), &plan.scenes[run.scene].path);
+        let reused = first && find_trained(&plan.reuse, scene, &run.config, run.training.as_deref())?.is_some();
         let iterations = if first && !reused { train.coarse_iterations + train.fine_iterations } else { 0 };
         rows.push(Planned {
             task: run.task,

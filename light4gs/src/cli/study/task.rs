@@ -12,6 +12,7 @@ use super::super::launch::{noting_failure, when_free};
 use super::super::output::tell;
 use super::super::signals::stop_flag;
 use super::super::train::{RunOutput, train_to_evaluation};
+use super::super::training::Trainings;
 
 #[derive(Debug, Args)]
 pub(in crate::cli) struct StudyTask {
@@ -25,7 +26,7 @@ pub(in crate::cli) struct StudyTask {
 }
 
 impl StudyTask {
-    pub(in crate::cli) fn run(self) -> Result<(), TrainError> {
+    pub(in crate::cli) fn run(self, trainings: &Trainings) -> Result<(), TrainError> {
         // Installed first, so that no request is lost.
         stop_flag();
         let (folder, manifest) = StudyFolder::open(&self.study)?;
@@ -37,11 +38,17 @@ impl StudyTask {
                 self.task
             )));
         }
-        noting_failure(&folder, self.task, || run_task(&folder, &manifest, self.task, self.quiet))
+        noting_failure(&folder, self.task, || run_task(&folder, &manifest, self.task, trainings, self.quiet))
     }
 }
 
-fn run_task(folder: &StudyFolder, manifest: &Manifest, task: usize, quiet: bool) -> Result<(), TrainError> {
+fn run_task(
+    folder: &StudyFolder,
+    manifest: &Manifest,
+    task: usize,
+    trainings: &Trainings,
+    quiet: bool,
+) -> Result<(), TrainError> {
     let mut trained: Option<PathBuf> = None;
     for run in manifest.task(task) {
         let path = folder.path(&run.name);
@@ -53,9 +60,11 @@ fn run_task(folder: &StudyFolder, manifest: &Manifest, task: usize, quiet: bool)
             let scene = &manifest.scenes[run.scene].path;
             let output = RunOutput { json: false, quiet, profile: false };
             if trained.is_none() {
-                trained = find_trained(&manifest.reuse, scene, &config)?;
+                trained = find_trained(&manifest.reuse, scene, &config, run.training.as_deref())?;
             }
-            let train = || train_to_evaluation(config.clone(), scene, &path, trained.as_deref(), &output).map(drop);
+            let training = trainings.by_name(run.training.as_deref())?;
+            let train =
+                || train_to_evaluation(training, config.clone(), scene, &path, trained.as_deref(), &output).map(drop);
             when_free(&path, train)?;
         }
         trained.get_or_insert(path);

@@ -11,6 +11,7 @@ use super::super::launch::{noting_failure, when_free};
 use super::super::output::tell;
 use super::super::signals::stop_flag;
 use super::super::train::{RunOutput, train_to_evaluation};
+use super::super::training::{Training, Trainings};
 use super::BASE;
 
 #[derive(Debug, Args)]
@@ -25,7 +26,7 @@ pub(in crate::cli) struct TakeTask {
 }
 
 impl TakeTask {
-    pub(in crate::cli) fn run(self) -> Result<(), TrainError> {
+    pub(in crate::cli) fn run(self, trainings: &Trainings) -> Result<(), TrainError> {
         // Installed first, so that no request is lost.
         stop_flag();
         let folder = TakeFolder::open(&self.take)?;
@@ -34,11 +35,11 @@ impl TakeTask {
             let take = self.take.display();
             return Err(TrainError::Input(format!("{take} has tasks 0 to {segments}, not {}", self.task)));
         }
-        noting_failure(&folder, self.task, || run_task(&folder, self.task, self.quiet))
+        noting_failure(&folder, self.task, || run_task(&folder, self.task, trainings.configured(), self.quiet))
     }
 }
 
-fn run_task(folder: &TakeFolder, task: usize, quiet: bool) -> Result<(), TrainError> {
+fn run_task(folder: &TakeFolder, task: usize, training: &dyn Training, quiet: bool) -> Result<(), TrainError> {
     let (name, run, config) = match task {
         BASE => ("the base".to_owned(), folder.base(), folder.config_of_base()),
         _ => {
@@ -54,5 +55,6 @@ fn run_task(folder: &TakeFolder, task: usize, quiet: bool) -> Result<(), TrainEr
         tell(&name);
     }
     let output = RunOutput { json: false, quiet, profile: false };
-    when_free(&run, || train_to_evaluation(config.clone(), &folder.record().scene, &run, None, &output).map(drop))
+    let scene = &folder.record().scene;
+    when_free(&run, || train_to_evaluation(training, config.clone(), scene, &run, None, &output).map(drop))
 }
