@@ -37,6 +37,7 @@ describe("in other engines", { skip: !installed && "npm ci in bindings/web/examp
     files.player = `<!doctype html><link rel=icon href="data:,"><canvas width=${SIZE} height=${SIZE}></canvas>`;
     files["scene.l4gs"] = sceneBytes();
     files["take.l4gs"] = makeTake(4);
+    Object.assign(files, wholePage());
     server = await serve(files);
     browser = await launch();
     if (pictures) mkdirSync(pictures, { recursive: true });
@@ -134,6 +135,24 @@ describe("in other engines", { skip: !installed && "npm ci in bindings/web/examp
     await page.context().close();
   });
 
+  test("the whole page of docs/engines.md plays", async () => {
+    const page = await open(browser, `${server.url}/whole-page`, { viewport: { width: SIZE, height: SIZE } });
+    await page.locator("canvas").waitFor();
+    /** Red, green and blue of the first picture that passes, within a minute. */
+    const picture = async (passes) => {
+      for (const end = Date.now() + 60_000; Date.now() < end; ) {
+        const { pixels } = readRgba(await page.screenshot());
+        if (passes(pixels)) return pixels;
+      }
+      throw new Error("nothing is drawn, or nothing moves");
+    };
+    // The background is black.
+    const first = await picture((pixels) => pixels.filter((value, i) => i % 4 < 3 && value > 64).length > 0.05 * pixels.length);
+    await picture((pixels) => !Buffer.from(pixels).equals(Buffer.from(first)));
+    assert.deepEqual(page.problems, []);
+    await page.context().close();
+  });
+
   test("three: the mesh goes where its matrix says", async () => {
     const page = await examplePage("three");
     await page.evaluate(() => {
@@ -181,6 +200,20 @@ describe("in other engines", { skip: !installed && "npm ci in bindings/web/examp
     await page.context().close();
   });
 });
+
+/** The page of docs/engines.md and the modules of its import map, where npm puts them. */
+function wholePage() {
+  const text = readFileSync(`${root}/docs/engines.md`, "utf8");
+  const html = /## A whole page\n.*?```html\n(.*?)```/s.exec(text)?.[1];
+  const { imports } = JSON.parse(/<script type="importmap">(.*?)<\/script>/s.exec(html)[1]);
+  const files = { "whole-page": html, "favicon.ico": "" };
+  for (const address of [...Object.values(imports), "./node_modules/three/build/three.core.js"]) {
+    const name = address.slice("./".length);
+    const ours = name.replace(/^node_modules\/light4gs-player\/(dist\/)?/, (_, built) => (built ? `${dist}/` : `${root}/bindings/web/`));
+    files[name] = readFileSync(ours === name ? `${examples}/${name}` : ours);
+  }
+  return files;
+}
 
 /** The picture of a page, when it does not change any more: some engines sort in a worker of their own. */
 async function still(page) {

@@ -37,7 +37,7 @@ use super::wishes::{bytes, check_quality, decibels};
 pub(super) struct Encode {
     /// Folder of a run.
     run: PathBuf,
-    /// A checkpoint of the run; the newest if not given.
+    /// A checkpoint of the run; by default the newest.
     #[arg(long)]
     checkpoint: Option<PathBuf>,
     /// The file to write.
@@ -48,18 +48,18 @@ pub(super) struct Encode {
     /// that were learned in training are not used.
     #[arg(long = "set", value_name = "KEY=VALUE")]
     overrides: Vec<String>,
-    /// Upper bound of the file in bytes, such as 300k or 2M; the file uses nearly all of it. Adapts the steps of attributes.
+    /// Upper bound of the file in bytes, such as 300k or 2M; the file comes close to it. Adapts the steps of attributes.
     #[arg(long, value_name = "NUMBER", value_parser = bytes)]
     target_bytes: Option<usize>,
-    /// Lower bound of the PSNR of the decoded file on the test views, dB: writes the smallest file above the bound. If there
-    /// is none, writes the best file, and the exit code is 2.
+    /// Lower bound of the PSNR of the decoded file on the test views, dB: writes the smallest file above the bound. If no
+    /// file reaches it, writes the best one, and the exit code is 2.
     #[arg(long, value_name = "NUMBER", value_parser = decibels, conflicts_with = "target_bytes")]
     target_db: Option<f64>,
-    /// Layers of Gaussians, the most significant ones first: with more than 1, such as 4, a player shows a coarse scene after the
-    /// first few bytes.
+    /// Layers of Gaussians, the most significant ones first. With several, such as 4, a player shows a coarse scene before the
+    /// whole file has arrived.
     #[arg(long, value_name = "NUMBER")]
     layers: Option<usize>,
-    /// Back end: auto (a graphics card where there is one), ndarray, flex, wgpu, or wgpu with an adapter such as wgpu:0.
+    /// Back end: auto (a graphics card if there is one), ndarray, flex, wgpu, or wgpu with an adapter such as wgpu:0.
     #[arg(long)]
     device: Option<DeviceName>,
     /// Print the result as JSON.

@@ -34,20 +34,20 @@ pub(super) struct Import {
     /// The kind of source.
     #[arg(long, value_enum)]
     from: Source,
-    /// Folder of the new run; for a PLY the .l4gs file to write.
+    /// Folder of the new run, or for a PLY the .l4gs file to write.
     #[arg(long)]
     out: PathBuf,
-    /// Folder of the dataset of the scene's training. With it, steps are searched on training images; without it, on views
-    /// around the scene.
+    /// Folder of the dataset on which the scene was trained. With it, quantization steps are searched on training images;
+    /// without it, on views around the scene.
     #[arg(long)]
     scene: Option<PathBuf>,
-    /// A preset or a TOML file with the coding of the scene. The source gives the model itself.
+    /// A preset or a TOML file that says how the scene is coded. The model itself comes from the source.
     #[arg(long, default_value = "imported", value_name = "PRESET|FILE")]
     config: String,
     /// Changes one key of the configuration; may be given more than once.
     #[arg(long = "set", value_name = "KEY=VALUE")]
     overrides: Vec<String>,
-    /// Back end: auto (a graphics card where there is one), ndarray, flex, wgpu, or wgpu with an adapter such as wgpu:0.
+    /// Back end: auto (a graphics card if there is one), ndarray, flex, wgpu, or wgpu with an adapter such as wgpu:0.
     #[arg(long)]
     device: Option<DeviceName>,
     /// Replace an existing run.

@@ -39,7 +39,7 @@ use light4gs_train::run::belongs_to_run;
 pub use program::Program;
 use training::Trainings;
 
-/// Learns dynamic scenes as deformable 3D Gaussians and stores each as one .l4gs file.
+/// Learns a moving scene as 3D Gaussians and their motion, and stores it as one small .l4gs file.
 #[derive(Debug, Parser)]
 #[command(name = "light4gs", version, arg_required_else_help = true)]
 struct Cli {
@@ -49,10 +49,10 @@ struct Cli {
 
 #[derive(Debug, Subcommand)]
 enum Command {
-    /// Make a small synthetic scene, train on it, write the file and the report.
+    /// Make a small synthetic scene, train on it, and write the file and the report.
     #[command(after_help = "Example:\n  light4gs quickstart --out runs/quickstart")]
     Quickstart(quickstart::Quickstart),
-    /// Make a dataset from one or several videos: frames by ffmpeg, poses by COLMAP (the program, or its package pycolmap).
+    /// Make a dataset from one or several videos: frames by ffmpeg, poses by COLMAP (the program, or the package pycolmap).
     #[command(after_help = "Examples:\n  light4gs prepare walk.mp4 --out data/walk\n  light4gs prepare left.mp4 \
                             middle.mp4 right.mp4 --out data/stage\n  light4gs train data/walk --out runs/walk")]
     Prepare(prepare::Prepare),
@@ -60,24 +60,24 @@ enum Command {
     /// The exit code is 2 if a training could only fail.
     #[command(after_help = "Example:\n  light4gs check data/walk --html walk.html")]
     Check(check::Check),
-    /// Train on a dataset, or on videos, which are prepared first.
+    /// Train on a dataset, or on videos (which are first prepared).
     #[command(
         after_help = "Examples:\n  light4gs train data/dnerf/bouncing --out runs/bouncing\n  light4gs train walk.mp4 --out runs/walk"
     )]
     Train(train::Train),
-    /// Continue a run from its last checkpoint. The result is that of an uninterrupted run.
+    /// Continue a run from its last checkpoint. The result is the same as without the interruption.
     #[command(after_help = "Example:\n  light4gs resume runs/bouncing")]
     Resume(train::Resume),
-    /// Measure the decoded file of a run: PSNR, SSIM, FPS, bytes by section.
+    /// Measure the decoded file of a run or of a take: PSNR, SSIM, FPS, bytes by section.
     ///
-    /// If the dataset has masks of moving pixels, PSNR and SSIM are also given for moving and for still pixels; docs/metrics.md
+    /// If the dataset has masks of moving pixels, PSNR and SSIM are also given for moving and for still pixels. docs/metrics.md
     /// explains every column.
     #[command(after_help = "Example:\n  light4gs eval runs/bouncing --json")]
     Eval(train::Eval),
-    /// Render a file over time along a camera path, to a GIF, an MP4 or PNG frames.
+    /// Render a file along a camera path while time runs, to a GIF, an MP4 or PNG frames.
     #[command(after_help = "Example:\n  light4gs render runs/bouncing/scene.l4gs --out bouncing.gif --frames 60")]
     Render(render::Render),
-    /// Show a file or a run in the browser, and follow a run that is still training.
+    /// Show a file, a run or a take in the browser, and follow a training.
     #[command(after_help = "Example:\n  light4gs view runs/bouncing --open")]
     View(view::View),
     /// Import a scene that another program has trained: a checkpoint of 4DGaussians, or a PLY file of 3DGS.
@@ -85,41 +85,40 @@ enum Command {
         after_help = "Examples:\n  light4gs import output/bouncing --from 4dgaussians --out runs/bouncing\n  light4gs import scene.ply --from ply --out scene.l4gs"
     )]
     Import(import::Import),
-    /// Write the newest checkpoint of a run as a .l4gs file.
+    /// Write the newest checkpoint of a run as a .l4gs file, for example in another size.
     #[command(after_help = "Example:\n  light4gs encode runs/bouncing --out bouncing.l4gs")]
     Encode(container::Encode),
     /// Unpack a .l4gs file to plain arrays (safetensors).
     #[command(after_help = "Example:\n  light4gs decode bouncing.l4gs --out bouncing.safetensors")]
     Decode(container::Decode),
-    /// Print the contents of a .l4gs file, with sizes by section.
+    /// Print the contents of a .l4gs file, with the bytes of each section.
     #[command(after_help = "Example:\n  light4gs info bouncing.l4gs --json")]
     Info(container::Info),
-    /// Write the Gaussians for other programs: PLY files at successive times, a single time as .ply or .glb, the motion
-    /// as .4dgs (of control nodes also as .glb); or write a page that plays the scene.
+    /// Write the scene for other programs (PLY files, .glb, .4dgs), or a page that plays it (--html, --site).
     #[command(
         after_help = "Examples:\n  light4gs export bouncing.l4gs --out frames --frames 30\n  light4gs export runs/bouncing --site bouncing"
     )]
     Export(export::Export),
-    /// Write the procedural scene of the quickstart as a D-NeRF dataset.
+    /// Make a synthetic dataset: the scene of the quickstart, or a take (--seconds).
     #[command(after_help = "Example:\n  light4gs synth data/synthetic --resolution 200")]
     Synth(synth::Synth),
-    /// Make a table or a figure of the paper: train variants of a scene, and compare them.
+    /// Make a table or a figure of the paper, or one of your own: train variants of scenes, and compare them.
     #[command(
         after_help = "Example:\n  light4gs study context-model data/dnerf/flag --config hexplane-dnerf-flag-cpu --seeds 3 --out runs/context"
     )]
     Study(study::Study),
-    /// Write a study's tables and report again from its finished runs, and name the missing runs.
+    /// Write the tables and the report of a study from its finished runs, and name the missing runs.
     #[command(after_help = "Example:\n  light4gs gather runs/context")]
     Gather(study::Gather),
     /// One task of a study, as its launcher starts it.
     #[command(hide = true)]
     StudyTask(study::StudyTask),
-    /// Write the file of a take from the segments that are trained: the first half plays while the second is in training.
+    /// Write the file of a take from the segments that are finished. So the first half plays while the second is in training.
     #[command(after_help = "Example:\n  light4gs join runs/walk")]
     Join(take::Join),
-    /// Train what has been filmed after the end of a take: its base and its segments stay as they are.
+    /// Train what was filmed after the end of a take. Its base and its segments stay as they are.
     ///
-    /// The same command goes on where it was stopped.
+    /// The same command continues after an interruption.
     #[command(after_help = "Example:\n  light4gs extend runs/walk data/walk-longer")]
     Extend(take::Extend),
     /// One task of a take, as its launcher starts it.
@@ -128,13 +127,13 @@ enum Command {
     /// Print what differs between runs: program and machine, configuration, results.
     #[command(after_help = "Example:\n  light4gs compare runs/one runs/other")]
     Compare(compare::Compare),
-    /// Print what an issue should say: version, machine, devices, last error. It has no paths and no names of yours.
+    /// Print what an issue should say: version, machine, devices, last error. It contains no paths or names of yours.
     #[command(after_help = "Example:\n  light4gs report")]
     Report(report::Report),
     /// Time every part of a training step on one or more devices.
     #[command(after_help = "Example:\n  light4gs bench --device ndarray,flex,wgpu --gaussians 20000 --size 400")]
     Bench(bench::Bench),
-    /// Print what completes the arguments of light4gs in a shell.
+    /// Print the script with which a shell completes the arguments of light4gs.
     #[command(
         hide = true,
         after_help = "Example:\n  light4gs completions bash > ~/.local/share/bash-completion/completions/light4gs"

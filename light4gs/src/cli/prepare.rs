@@ -16,7 +16,7 @@ pub(super) struct Prepare {
     /// One video of a moving camera, or the videos of several cameras that were started together.
     #[arg(required = true, value_name = "VIDEO")]
     videos: Vec<PathBuf>,
-    /// Folder to make; a folder that was begun with the same videos and options is continued.
+    /// Folder to make. If it was begun with the same videos and options, it is continued.
     #[arg(long)]
     out: PathBuf,
     /// Frames to take from each video, spread evenly over it.
@@ -25,10 +25,10 @@ pub(super) struct Prepare {
     /// Wider frames are scaled down to this width, in pixels.
     #[arg(long, default_value_t = 1600, value_name = "PIXELS")]
     max_width: u32,
-    /// The cameras of a rig move: find a pose for every frame. By default, one pose for each camera.
+    /// Find a pose for every frame, for a rig whose cameras move. By default, one pose for each camera.
     #[arg(long)]
     moving: bool,
-    /// No progress.
+    /// Show no progress.
     #[arg(long)]
     quiet: bool,
 }

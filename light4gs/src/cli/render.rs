@@ -21,11 +21,11 @@ const ORBIT: (f32, f32) = (4.0, 30.0);
 
 #[derive(Clone, Copy, Debug, ValueEnum)]
 enum Path {
-    /// Once around the scene while time runs from 0 to 1.
+    /// The camera goes once around the scene while time runs from 0 to 1.
     Orbit,
-    /// The orbit's first camera stands still while time runs.
+    /// The camera stands still at the beginning of the orbit while time runs.
     Fixed,
-    /// The orbit at a single time (see --time).
+    /// The camera goes once around the scene while time stands still (see --time).
     Frozen,
 }
 
@@ -60,7 +60,7 @@ pub(super) struct Render {
     /// Frames a second of a GIF or an MP4.
     #[arg(long, default_value_t = 20.0, allow_negative_numbers = true)]
     fps: f32,
-    /// Back end: auto (a graphics card where there is one), ndarray, flex, wgpu, or wgpu with an adapter such as wgpu:0.
+    /// Back end: auto (a graphics card if there is one), ndarray, flex, wgpu, or wgpu with an adapter such as wgpu:0.
     #[arg(long, default_value_t)]
     device: DeviceName,
     #[command(flatten)]

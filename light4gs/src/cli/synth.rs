@@ -27,7 +27,7 @@ pub(super) struct Synth {
     /// Seed of the cameras.
     #[arg(long, default_value_t = 0, allow_negative_numbers = true)]
     seed: u64,
-    /// Makes a take of so many seconds: a room in which things come, go and rest.
+    /// Make a take of this number of seconds: a room in which objects come, go and rest.
     #[arg(long, allow_negative_numbers = true)]
     seconds: Option<f64>,
     #[command(flatten)]
@@ -37,7 +37,7 @@ pub(super) struct Synth {
 /// Options of a take.
 #[derive(Debug, Args)]
 struct Take {
-    /// Cameras of a take: one moves [default: 1]; several stand still, with one more for testing.
+    /// Cameras of a take: one camera moves; several cameras stand still, and there is one more for testing [default: 1].
     #[arg(long, requires = "seconds", allow_negative_numbers = true)]
     cameras: Option<usize>,
     /// Frames a second of a take [default: 30].

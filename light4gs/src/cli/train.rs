@@ -37,7 +37,7 @@ pub(super) struct RunOutput {
     /// Print the result as JSON.
     #[arg(long)]
     pub(super) json: bool,
-    /// No progress bars.
+    /// Show no progress bars.
     #[arg(long)]
     pub(super) quiet: bool,
     /// Print the time of every part of a training step. The run becomes slower, since it waits for the device after
@@ -52,8 +52,8 @@ pub(super) struct Train {
     /// the folder OUT-prepared (see `light4gs prepare`). An interrupted command continues where it stopped.
     #[arg(required = true, value_name = "SCENE|VIDEO")]
     scene: Vec<PathBuf>,
-    /// A preset (see docs/configuration.md) or a TOML file. Without it: the preset of the dataset's layout, such as dnerf, with
-    /// control nodes. The paper's hexplane: hexplane-dnerf-cpu, paper-dnerf+paper-coding.
+    /// A preset (see docs/configuration.md) or a TOML file. By default the preset of the dataset's layout, such as dnerf, which
+    /// trains control nodes. paper-dnerf+paper-coding trains the paper's hexplane with the paper's protocol.
     #[arg(long, value_name = "PRESET|FILE")]
     config: Option<String>,
     /// Layout of the dataset; without it, it is found by content (see docs/data.md).
@@ -65,14 +65,14 @@ pub(super) struct Train {
     /// Changes one key of the configuration; may be given more than once.
     #[arg(long = "set", value_name = "KEY=VALUE")]
     overrides: Vec<String>,
-    /// Back end: auto (a graphics card where there is one), ndarray, flex, wgpu, or wgpu with an adapter such as wgpu:0.
+    /// Back end: auto (a graphics card if there is one), ndarray, flex, wgpu, or wgpu with an adapter such as wgpu:0.
     #[arg(long)]
     device: Option<DeviceName>,
     #[command(flatten)]
     wishes: Wishes,
-    /// Train a take: a base that stands still, and segments of about this number of seconds, which play as one file. `auto`: two
-    /// seconds, but 45 to 90 frames. No segment goes beyond a cut. For captures of more than some ten seconds. The same command goes
-    /// on where it was stopped.
+    /// Train a take, for captures of more than about ten seconds: a base that stands still, and segments of about this number of
+    /// seconds, which play as one file. `auto`: two seconds, but at least 45 and at most 90 frames. No segment crosses a cut. The
+    /// same command continues after an interruption.
     #[arg(long, value_name = "SECONDS|auto", value_parser = segment_length)]
     segment: Option<SegmentLength>,
     #[command(flatten)]
@@ -273,7 +273,7 @@ pub(super) struct Resume {
     /// Folder of the run, or of a take.
     run: PathBuf,
     /// Changes one key of the run's configuration from now on, for example a learning rate that was too high; may be
-    /// given more than once. The changed configuration must fit what has been trained.
+    /// given more than once. The changed configuration must fit the trained scene.
     #[arg(long = "set", value_name = "KEY=VALUE")]
     overrides: Vec<String>,
     /// A back end other than the run's: ndarray, flex, wgpu, or wgpu with an adapter such as wgpu:0.
@@ -319,12 +319,12 @@ impl Resume {
 
 #[derive(Debug, Args)]
 pub(super) struct Eval {
-    /// Folder of a run, or a .l4gs file (then --scene is needed).
+    /// Folder of a run or of a take, or a .l4gs file (then --scene is needed).
     run: PathBuf,
     /// Folder of the dataset, if it is not the run's own.
     #[arg(long)]
     scene: Option<PathBuf>,
-    /// Back end: auto (a graphics card where there is one), ndarray, flex, wgpu, or wgpu with an adapter such as wgpu:0.
+    /// Back end: auto (a graphics card if there is one), ndarray, flex, wgpu, or wgpu with an adapter such as wgpu:0.
     #[arg(long)]
     device: Option<DeviceName>,
     /// Weights of LPIPS (see docs/metrics.md), in place of the configuration's `eval.lpips`; may be given more than once.

@@ -29,12 +29,12 @@ pub(super) struct Wishes {
     /// which is measured before the start.
     #[arg(long, value_name = "NUMBER", value_parser = minutes)]
     minutes: Option<f64>,
-    /// Upper bound of the file in bytes, such as 300k or 2M; the file uses nearly all of it. Adapts the number of Gaussians
+    /// Upper bound of the file in bytes, such as 300k or 2M; the file comes close to it. Adapts the number of Gaussians
     /// and the weight of a byte in the loss.
     #[arg(long, value_name = "NUMBER", value_parser = bytes)]
     target_bytes: Option<usize>,
-    /// Lower bound of the PSNR of the decoded file on the test views, dB; the file is hardly better. Adapts the weight of a
-    /// byte in the loss in the last part of training. A run below the bound is kept, and the exit code is 2.
+    /// Lower bound of the PSNR of the decoded file on the test views, dB; the file comes close to it. Adapts the weight of a
+    /// byte in the loss in the last part of training. If the run misses the bound, it is kept, and the exit code is 2.
     #[arg(long, value_name = "NUMBER", value_parser = decibels, conflicts_with = "target_bytes")]
     target_db: Option<f64>,
 }
@@ -162,10 +162,16 @@ fn longest_side(data: &Scene) -> u32 {
 fn in_minutes(minutes: f64, scenes: f64, pace: &Pace, scaled: impl Fn(f64) -> Config) -> Result<Config, TrainError> {
     let minutes_of = |factor: f64| scenes * pace.training_seconds(&scaled(factor)) / 60.0;
     let [least, most] = [SHORTEST, LONGEST].map(minutes_of);
-    if !(least..=most).contains(&minutes) {
+    if minutes < least {
         return Err(TrainError::Input(format!(
-            "--minutes {minutes}: this scene takes {least:.1} to {most:.0} minutes on this machine; give a number \
-             between them, or another --pixels"
+            "--minutes {minutes}: even the shortest training of this scene takes about {least:.1} minutes on this machine, \
+             beside what else runs on it now; give more minutes, or fewer pixels (--pixels)"
+        )));
+    }
+    if minutes > most {
+        return Err(TrainError::Input(format!(
+            "--minutes {minutes}: even the longest training of this scene takes about {most:.0} minutes on this machine; \
+             give fewer minutes"
         )));
     }
     // The time is not proportional to the factor: in a short schedule fewer Gaussians are added. So the logarithm of the

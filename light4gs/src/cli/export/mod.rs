@@ -46,31 +46,32 @@ pub(super) struct Export {
     /// The .l4gs file, a scene or a take; or the folder of a run or of a take.
     #[arg(value_name = "FILE|RUN")]
     file: PathBuf,
-    /// Folder or file. Folder (no suffix, a slash at the end, or an existing folder): `0000.ply`, `0001.ply`, ...; it must
-    /// not hold numbered PLY files of another sequence. .zip: the same PLY files. .ply, .glb (KHR_gaussian_splatting): a
-    /// single time. .4dgs: the whole motion. A .glb of control nodes has the whole motion too (skin and animation), unless
-    /// --time asks for a single time. A take is a .glb for each segment (--to glb), or a single time (--at, --base).
+    /// Folder or file; its name says what is written. A folder (no suffix, a slash at the end, or an existing folder) gets
+    /// `0000.ply`, `0001.ply`, ...; it must not hold numbered PLY files of another sequence. .zip: the same PLY files. .ply: a
+    /// single time. .4dgs: the whole motion. .glb (KHR_gaussian_splatting): the whole motion of control nodes (skin and
+    /// animation), or a single time for other fields and with --time. From a take, .ply and .glb files have a single time (--at,
+    /// --base); --to glb writes a .glb for each segment.
     #[arg(long, required_unless_present_any = ["html", "site"])]
     out: Option<PathBuf>,
-    /// What a folder holds. ply: a file for each frame. glb, of a take: a file for each segment, with its motion and what
-    /// stands still around it; `base.glb`, what stands still over the whole take; and `segments.json`, when each is shown.
+    /// Files of the folder. ply: a file for each frame. glb, for takes only: a file for each segment, with its motion and what
+    /// stands still around it; `base.glb` with what stands still over the whole take; and `segments.json` with the times of each.
     #[arg(long, value_enum, value_name = "KIND", default_value = "ply")]
     to: FolderOf,
     /// A single time of a take in seconds, for a .ply or .glb file.
     #[arg(long, value_name = "SECONDS", allow_negative_numbers = true, conflicts_with_all = ["frames", "fps", "time"])]
     at: Option<f64>,
-    /// What stands still over the whole take, for a .ply or .glb file. The first bytes of the take are enough: its index and its
-    /// base.
+    /// Write only what stands still over the whole take, for a .ply or .glb file. The first bytes of the take are enough: its
+    /// index and its base.
     #[arg(long, conflicts_with_all = ["frames", "fps", "time", "at"])]
     base: bool,
-    /// One file that plays the scene in a browser without any other file.
+    /// A page that plays the scene in a browser without any other file.
     #[arg(long, value_name = "FILE", conflicts_with_all = ["out", "frames", "device", "time", "fps", "z_up", "limits", "at", "base"])]
     html: Option<PathBuf>,
     /// A folder that any static server shows: the page `index.html`, the player, the file, cameras, and a picture for previews of
     /// its link.
     #[arg(long, value_name = "DIR", conflicts_with_all = ["html", "out", "frames", "device", "time", "fps", "z_up", "limits", "at", "base"])]
     site: Option<PathBuf>,
-    /// The address at which the folder of --site will be: previews of links need whole addresses.
+    /// The address at which the folder of --site will be. Previews of links need it.
     #[arg(long, value_name = "ADDRESS", requires = "site")]
     url: Option<String>,
     /// Dataset whose cameras the page offers; by default that of the run whose folder holds the file.
@@ -79,17 +80,17 @@ pub(super) struct Export {
     /// Number of frames over time 0 to 1, keyframes in a .glb; by default as many as the file was made from.
     #[arg(long, value_parser = clap::value_parser!(u32).range(1..=i64::from(MOST_FRAMES)), allow_negative_numbers = true)]
     frames: Option<u32>,
-    /// A single time, in [0, 1], for a .ply or .glb file; 0 where one is needed and none is given.
+    /// A single time, in [0, 1], for a .ply or .glb file; by default 0 if the file needs one.
     #[arg(long, allow_negative_numbers = true, conflicts_with_all = ["frames", "fps"])]
     time: Option<f32>,
-    /// Frames a second of a .4dgs or of a .glb that moves, and of the PLY files of a take; by default those of the source, or
+    /// Frames a second of a .4dgs, of a .glb with motion, and of the PLY files of a take; by default those of the source, or
     /// 30.
     #[arg(long, allow_negative_numbers = true)]
     fps: Option<f32>,
-    /// In a .glb: the scene's z axis points up, as in Blender. glTF's y axis does.
+    /// For a .glb: the scene's z axis points up, as in Blender. The file is turned, since glTF's y axis points up.
     #[arg(long)]
     z_up: bool,
-    /// Back end: auto (a graphics card where there is one), ndarray, flex, wgpu, or wgpu with an adapter such as wgpu:0.
+    /// Back end: auto (a graphics card if there is one), ndarray, flex, wgpu, or wgpu with an adapter such as wgpu:0.
     #[arg(long, default_value_t)]
     device: DeviceName,
     #[command(flatten)]

@@ -28,13 +28,13 @@ pub(super) enum Launcher {
 /// How tasks are started.
 #[derive(Debug, Args)]
 pub(super) struct LaunchOptions {
-    /// The launcher of the tasks.
+    /// Where the tasks run.
     #[arg(long, value_enum, default_value = "local")]
     pub(super) launcher: Launcher,
-    /// Tasks at a time.
+    /// Number of tasks that run at the same time.
     #[arg(long, default_value_t = 1, value_parser = clap::value_parser!(u32).range(1..=10_000))]
     pub(super) jobs: u32,
-    /// TOML file with partition, account, GPUs a task and wall time; see docs/studies.md.
+    /// TOML file with partition, account, GPUs for each task, and wall time; see docs/studies.md.
     #[arg(long, value_name = "FILE")]
     slurm: Option<PathBuf>,
 }

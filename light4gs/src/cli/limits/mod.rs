@@ -15,8 +15,7 @@ pub(super) struct LimitsArgument {
 
 #[derive(Clone, Copy, Debug, ValueEnum)]
 enum Choice {
-    /// For files of strangers: 256 MiB and about 2 seconds on one thread; more for a large file, in proportion to its
-    /// size.
+    /// For untrusted files: 256 MiB and about 2 seconds on one thread; more for a large file, in proportion to its size.
     Default,
     /// For files that you trust: up to 64 GiB and half an hour.
     Large,

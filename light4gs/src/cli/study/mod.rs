@@ -54,16 +54,16 @@ pub(super) struct Study {
     /// stands for the scene's name.
     #[arg(long, value_name = "PRESET|FILE")]
     config: Option<String>,
-    /// Factor of the length of every variant's schedule: 0.25 for a first look.
+    /// Factor of the length of every variant's schedule, such as 0.25 for a first look.
     #[arg(long, value_name = "FACTOR")]
     schedule: Option<f64>,
     /// Changes one key of every variant's configuration; may be given more than once.
     #[arg(long = "set", value_name = "KEY=VALUE")]
     overrides: Vec<String>,
-    /// Back end: auto (a graphics card where there is one), ndarray, flex, wgpu, or wgpu with an adapter such as wgpu:0.
+    /// Back end: auto (a graphics card if there is one), ndarray, flex, wgpu, or wgpu with an adapter such as wgpu:0.
     #[arg(long)]
     device: Option<DeviceName>,
-    /// Runs of each variant on each scene, with different seeds: tables then show mean and standard deviation.
+    /// Runs of each variant on each scene, with different seeds. Tables then show means and standard deviations.
     #[arg(long, default_value_t = 1, value_parser = clap::value_parser!(u64).range(1..=1000))]
     seeds: u64,
     /// Folder of another study; its equal trainings are reused. May be given more than once.
@@ -81,7 +81,7 @@ pub(super) struct Study {
     /// Print the results as JSON.
     #[arg(long)]
     json: bool,
-    /// No progress bars.
+    /// Show no progress bars.
     #[arg(long)]
     quiet: bool,
 }

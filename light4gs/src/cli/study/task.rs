@@ -20,7 +20,7 @@ pub(in crate::cli) struct StudyTask {
     study: PathBuf,
     /// Number of the task.
     task: usize,
-    /// No progress bars.
+    /// Show no progress bars.
     #[arg(long)]
     quiet: bool,
 }

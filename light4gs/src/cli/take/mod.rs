@@ -129,13 +129,13 @@ fn join(folder: &TakeFolder) -> Result<(), TrainError> {
 
 #[derive(Debug, Args)]
 pub(super) struct Extend {
-    /// Folder of a take that is trained.
+    /// Folder of a trained take.
     run: PathBuf,
-    /// Folder of the dataset with more frames after those of the take; it may be the take's own, which has grown.
+    /// Folder of a dataset that has more frames after those of the take. It may be the take's own dataset, with new frames.
     scene: PathBuf,
     #[command(flatten)]
     launch: LaunchOptions,
-    /// No progress bars.
+    /// Show no progress bars.
     #[arg(long)]
     quiet: bool,
 }

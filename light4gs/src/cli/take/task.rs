@@ -20,7 +20,7 @@ pub(in crate::cli) struct TakeTask {
     take: PathBuf,
     /// Number of the task: 0 is the base, segment i is task i + 1.
     task: usize,
-    /// No progress bars.
+    /// Show no progress bars.
     #[arg(long)]
     quiet: bool,
 }

@@ -56,7 +56,7 @@ const MOST_CAMERAS: usize = 500;
 
 #[derive(Debug, Args)]
 pub(super) struct View {
-    /// A .l4gs file, or the folder of a run; during a training the page follows the newest checkpoint.
+    /// A .l4gs file, or the folder of a run or of a take. During a training, the page shows the newest checkpoint.
     #[arg(value_name = "FILE|RUN", required_unless_present = "trainer")]
     what: Option<PathBuf>,
     /// Dataset whose cameras the player offers; by default the run's own.
