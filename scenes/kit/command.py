@@ -34,7 +34,8 @@ def main():
 
     scene = importlib.import_module(options.name).Scene()
     try:
-        dataset.write(scene, options.out or Path("data/dnerf") / options.name, options.size, options.threads, options.only)
+        folder = options.out or Path("data/dnerf") / options.name
+        dataset.write(options.name, scene, folder, options.size, options.threads, options.only)
     except dataset.Refused as problem:
         sys.exit(f"scenes/render: {problem}")
 

@@ -11,7 +11,7 @@ import bpy
 from mathutils import Matrix
 from PIL import Image
 
-from . import cameras, studio
+from . import cameras, digest, studio
 from .paint import glow_only
 
 SPLITS = {"train": 100, "test": 20, "val": 10}
@@ -23,8 +23,8 @@ class Refused(Exception):
     """What the folder or the options have wrong, in words for the person who asked."""
 
 
-def write(scene, folder, size, threads, only=None):
-    """Renders all splits. Pictures that are there already are kept, so what was stopped goes on.
+def write(name, scene, folder, size, threads, only=None):
+    """Renders all splits of a scene. Pictures that are there already are kept, so what was stopped goes on.
 
     `only`: instead of everything, the picture of this split and number, such as `train:12`.
     """
@@ -54,6 +54,7 @@ def write(scene, folder, size, threads, only=None):
         _say(f"{path}: {number} of {len(missing)}, {(time.monotonic() - begun) / number:.1f} s each")
     if only is None:
         _write_masks(scene, folder, plan, camera, size)
+        _say(f"{folder}: {digest.compared(name, size, digest.of(folder))}")
 
 
 def _write_masks(scene, folder, plan, camera, size):
