@@ -19,6 +19,7 @@
 //! | see what makes a capture hard | [`camera_curves`], [`capture_faults`] |
 //! | find cameras of a rig that are out of step | [`out_of_step`] |
 //! | notice that a dataset has changed | [`DatasetDigest`] |
+//! | tell whether a folder is a whole copy of a published scene | [`KnownCopy`] |
 //! | make a camera, or a path of cameras | [`Camera::look_at`], [`orbit_path`] |
 //! | undo the distortion of a lens | nothing: [`ImageStore`] does it; [`Lens`] is the model |
 //! | read or write point clouds and Gaussians as PLY | [`PointCloud`], [`GaussianPly`], [`ply`] |
@@ -72,6 +73,7 @@ mod exchange;
 mod faults;
 mod frame;
 mod images;
+mod known;
 mod layouts;
 mod lens;
 mod numbered;
@@ -103,6 +105,7 @@ pub use frame::{Frame, Mask, MaskMeaning};
 pub use images::{
     ImageStore, PixelMask, Region, RgbImage8, RgbImage32, composite, composite_resized, image_size, regions,
 };
+pub use known::KnownCopy;
 pub use layouts::{Colmap, DNerf, DatasetLayout, HyperNerf, Layouts, NerfDs, Nerfstudio, Neu3d};
 pub use lens::{Distortion, Lens};
 pub use numbered::NumberedFiles;

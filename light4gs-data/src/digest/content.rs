@@ -25,6 +25,11 @@ impl Content {
     pub(crate) fn of(path: &Path) -> Result<Self, DataError> {
         sampled(path).map_err(DataError::io("read", path))
     }
+
+    /// The first 8 hexadecimal digits of the hash: enough to notice a file that was damaged or replaced, not a forgery.
+    pub(crate) fn short(&self) -> &str {
+        self.hash.get(..8).unwrap_or_default()
+    }
 }
 
 fn sampled(path: &Path) -> io::Result<Content> {

@@ -5,7 +5,8 @@ use std::path::{Path, PathBuf};
 use clap::Args;
 use clap::builder::PossibleValuesParser;
 use light4gs_data::{
-    CameraCurve, CaptureSummary, DataError, ImageStore, Layouts, RgbImage8, Scene, camera_curves, write_atomically,
+    CameraCurve, CaptureSummary, DataError, ImageStore, KnownCopy, Layouts, RgbImage8, Scene, camera_curves,
+    write_atomically,
 };
 use light4gs_report::capture_page;
 use light4gs_train::config::Config;
@@ -49,6 +50,8 @@ struct Checked<'a> {
     capture: &'a CaptureSummary,
     /// What the images of each camera are like over time.
     cameras: &'a [CameraCurve],
+    /// The published scene of which this is a copy.
+    known: Option<&'a KnownCopy>,
 }
 
 impl Check {
@@ -67,14 +70,18 @@ impl Check {
         let scene = Scene::open(&self.scene, &load_options(&config))?;
         let store = image_store(&config);
         let (capture, curves) = understand(&store, &scene)?;
+        let known = KnownCopy::of(&self.scene);
         if let Some(page) = &self.html {
             let html = capture_page(&scene, &capture, &curves, &contact_sheet(&store, &scene)?)?;
             write_atomically(page, |out| std::io::Write::write_all(out, html.as_bytes()))?;
         }
         if self.json {
-            say_json(&Checked { capture: &capture, cameras: &curves })?;
+            say_json(&Checked { capture: &capture, cameras: &curves, known: known.as_ref() })?;
         } else {
             say(table(&capture))?;
+            if let Some(copy) = &known {
+                say(format_args!("known: {copy}"))?;
+            }
             remarks(&capture).try_for_each(say)?;
             if let Some(page) = &self.html {
                 say(format_args!("page: {}", page.display()))?;

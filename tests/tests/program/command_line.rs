@@ -474,3 +474,14 @@ fn wrong_arguments() {
         assert!(String::from_utf8_lossy(&output.stdout).contains("\nExample"), "{command} --help has no example");
     }
 }
+
+/// The scene that `synth` makes is in no table of published scenes.
+#[test]
+fn a_scene_that_is_not_known_is_not_taken_for_a_known_one() {
+    let w = Workspace::new(PROGRAM);
+    let output = w.run(["check", "scene", "--json"]);
+    assert_success(&output);
+    let checked: serde_json::Value = serde_json::from_slice(&output.stdout).unwrap();
+    assert_eq!(checked.get("known"), Some(&serde_json::Value::Null));
+    assert!(!String::from_utf8_lossy(&w.run(["check", "scene"]).stdout).contains("known:"));
+}
