@@ -58,7 +58,8 @@ const filesBelow = (folder, under = "") =>
 
 /** Every page as it looks: tables that are text, and what is wider than the page. Its links and the places that links may name. */
 async function pages(browser, base) {
-  const names = filesBelow(site).filter((name) => name.endsWith(".html") && !name.startsWith("api/"));
+  // toc.html is shown inside of the others where there is no script.
+  const names = filesBelow(site).filter((name) => name.endsWith(".html") && !name.startsWith("api/") && name !== "toc.html");
   const places = new Map();
   const links = new Map();
   const look = async (page, name) => {
