@@ -8,13 +8,12 @@ let shown = null;
 
 function play(link, byHand) {
   shown?.player.replaceWith(shown.link);
-  const picture = link.querySelector("img");
   const player = document.createElement("l4gs-player");
   for (const name of ["autoplay", "loop"]) player.setAttribute(name, "");
   if (link.dataset.cameras) player.setAttribute("cameras", link.dataset.cameras);
   player.setAttribute("src", link.getAttribute("href"));
   player.className = link.className;
-  player.style.setProperty("--shape", `${picture.getAttribute("width")} / ${picture.getAttribute("height")}`);
+  player.style.cssText = link.style.cssText;
   link.replaceWith(player);
   shown = { player, link };
   if (byHand) player.focus({ preventScroll: true });
