@@ -9,7 +9,7 @@ import { launch, root } from "../../bindings/web/tests/harness.mjs";
 import { emulate } from "../../bindings/web/tests/take_measures.mjs";
 
 const { values } = parseArgs({
-  options: { report: { type: "string" }, bound: { type: "string", default: "2000" }, only: { type: "string", default: "pages,search,gallery,first,export" } },
+  options: { report: { type: "string" }, bound: { type: "string", default: process.env.LIGHT4GS_WEB_STRICT ? "2000" : "10000" }, only: { type: "string", default: "pages,search,gallery,first,export" } },
 });
 const parts = values.only.split(",");
 const site = `${root}/target/site`;
@@ -69,6 +69,7 @@ async function pages(browser, base) {
       wider: document.documentElement.scrollWidth - document.documentElement.clientWidth,
       places: [...document.querySelectorAll("[id]")].map(({ id }) => id),
       links: [...document.querySelectorAll("a[href]")].map(({ href }) => href),
+      flat: [...document.querySelectorAll("l4gs-player")].filter(({ canvas }) => !(canvas?.clientHeight > 100)).length,
       empty: [...document.images].filter((image) => image.loading !== "lazy" && image.naturalWidth === 0).map(({ src }) => src),
     }));
   };
@@ -77,6 +78,7 @@ async function pages(browser, base) {
     for (const name of names) {
       const seen = await look(page, name);
       if (seen.wider > 0) problem(name, `is ${seen.wider} pixels wider than a window of ${width}`);
+      if (seen.flat > 0) problem(name, `a player without height in a window of ${width}`);
       if (width !== WIDTHS[0]) continue;
       if (/\|\s*:?---/.test(seen.text)) problem(name, "a table is shown as text");
       if (/^```/m.test(seen.text)) problem(name, "a block of code is shown as text");

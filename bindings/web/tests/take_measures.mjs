@@ -22,7 +22,7 @@ export const LATE = 50;
 /** The page, of which all but the player's own is what a user writes. */
 const html = ({ width = 640, height = 480 }) => `<!doctype html><link rel=icon href='data:,'>
 <body style='margin:0'><script type=module src=light4gs-player.js></script>
-<l4gs-player loop style='display:block;width:${width}px;height:${height + 60}px'></l4gs-player>
+<l4gs-player loop style='width:${width}px;height:${height + 60}px'></l4gs-player>
 <script type=module>
 const element = document.querySelector("l4gs-player");
 /** An image that the graphics card has drawn. */
