@@ -116,8 +116,14 @@ async function search(browser, base) {
   const page = await open(browser);
   await page.goto(`${base}/index.html`);
   await page.locator("#mdbook-search-toggle, #search-toggle").click();
-  await page.locator("#mdbook-searchbar, #searchbar").fill("checkerboard");
   const result = page.locator("#mdbook-searchresults a, #searchresults a").first();
+  const bar = page.locator("#mdbook-searchbar, #searchbar");
+  // What is written before the index has come is not searched for.
+  for (let tries = 0; tries < 60 && !(await result.isVisible()); tries++) {
+    await bar.fill("");
+    await bar.pressSequentially("checkerboard");
+    await page.waitForTimeout(1000);
+  }
   await result.click();
   await page.waitForLoadState();
   if (!/checkerboard/i.test(await page.locator("main").innerText())) problem("search", `the first result does not have the word: ${page.url()}`);
@@ -236,11 +242,16 @@ const server = await serve(folder);
 const browser = await launch();
 try {
   const base = `${server.url}/${FOLDER}`;
-  if (parts.includes("first")) await first(browser, base);
-  if (parts.includes("pages")) await pages(browser, base);
-  if (parts.includes("search")) await search(browser, base);
-  if (parts.includes("gallery")) await gallery(browser, base);
-  if (parts.includes("export")) await exported(browser, server.url, folder);
+  const work = {
+    first: () => first(browser, base),
+    pages: () => pages(browser, base),
+    search: () => search(browser, base),
+    gallery: () => gallery(browser, base),
+    export: () => exported(browser, server.url, folder),
+  };
+  for (const part of Object.keys(work).filter((part) => parts.includes(part))) {
+    await work[part]().catch((error) => problem(part, error.message));
+  }
 } finally {
   await browser.close();
   server.close();
