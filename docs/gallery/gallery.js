@@ -12,8 +12,11 @@ function play(link, byHand) {
   for (const name of ["autoplay", "loop"]) player.setAttribute(name, "");
   if (link.dataset.cameras) player.setAttribute("cameras", link.dataset.cameras);
   player.setAttribute("src", link.getAttribute("href"));
+  player.id = link.id;
   player.className = link.className;
   player.style.cssText = link.style.cssText;
+  // What one moving camera has filmed looks right from its path.
+  if ("follow" in link.dataset) player.addEventListener("load", () => (player.player.following = true));
   link.replaceWith(player);
   shown = { player, link };
   if (byHand) player.focus({ preventScroll: true });
@@ -30,5 +33,8 @@ for (const link of links) {
     play(link, true);
   });
 }
-const first = links.find(({ id }) => `#${id}` === location.hash) ?? links[0];
+const named = links.find(({ id }) => `#${id}` === location.hash);
+const first = named ?? links[0];
 if (first) play(first, false);
+// The browser has looked for the place before it was a player.
+if (named) shown.player.scrollIntoView({ block: "center" });
