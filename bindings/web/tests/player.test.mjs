@@ -325,6 +325,24 @@ describe("the element", () => {
     await page.waitForFunction(() => !document.querySelector("l4gs-player").find("bar").hidden);
     return page;
   };
+  test("a page may place it as it likes", async () => {
+    const page = await open(browser, server.url);
+    const heights = await page.evaluate(async () => {
+      await import("/light4gs-player.js");
+      const shown = {};
+      for (const style of ["", "display:block", "display:block;position:static;height:300px", "display:grid;aspect-ratio:1", "position:fixed;inset:0", "display:none"]) {
+        document.body.innerHTML = `<div style="position:relative;width:400px;height:100px"><l4gs-player style="${style}"></l4gs-player></div>`;
+        const element = document.querySelector("l4gs-player");
+        shown[style] = [element.clientHeight, element.canvas.clientHeight];
+      }
+      return shown;
+    });
+    for (const [style, [element, canvas]] of Object.entries(heights)) assert.equal(canvas, element, style);
+    assert.deepEqual(Object.values(heights).map(([element]) => element).slice(0, 4), [300, 300, 300, 400]);
+    assert.deepEqual(page.problems, []);
+    await page.context().close();
+  });
+
   const state = (page) =>
     page.evaluate(() => {
       const { player } = document.querySelector("l4gs-player");

@@ -22,7 +22,7 @@ export const LATE = 50;
 /** The page, of which all but the player's own is what a user writes. */
 const html = ({ width = 640, height = 480 }) => `<!doctype html><link rel=icon href='data:,'>
 <body style='margin:0'><script type=module src=light4gs-player.js></script>
-<l4gs-player loop style='display:block;width:${width}px;height:${height + 60}px'></l4gs-player>
+<l4gs-player loop style='width:${width}px;height:${height + 60}px'></l4gs-player>
 <script type=module>
 const element = document.querySelector("l4gs-player");
 /** An image that the graphics card has drawn. */
@@ -62,6 +62,17 @@ globalThis.note = () => {
 </script>`;
 
 /**
+ * Gives a page a slow connection.
+ * @param {any} page @param {{ megabits: number, latency: number }} conditions
+ */
+export async function emulate(page, { megabits, latency }) {
+  const session = await page.context().newCDPSession(page);
+  await session.send("Network.enable");
+  const throughput = (megabits * 1e6) / 8;
+  await session.send("Network.emulateNetworkConditions", { offline: false, latency, downloadThroughput: throughput, uploadThroughput: throughput });
+}
+
+/**
  * A page of its own browser, with the take at its server.
  * @param {Buffer} bytes @param {Conditions} conditions
  * @param {(page: any, served: any, browser: any) => Promise<T>} measure
@@ -80,10 +91,7 @@ async function inPage(bytes, conditions, measure, { hash = "" } = {}) {
   const browser = await launch(["--enable-blink-features=ForceEagerMeasureMemory"]);
   try {
     const page = await open(browser, `${server.url}/empty`, { viewport: { width, height: height + 60 } });
-    const session = await page.context().newCDPSession(page);
-    await session.send("Network.enable");
-    const throughput = (megabits * 1e6) / 8;
-    await session.send("Network.emulateNetworkConditions", { offline: false, latency, downloadThroughput: throughput, uploadThroughput: throughput });
+    await emulate(page, { megabits, latency });
     // A browser that has only just been started is not what people have.
     await page.waitForTimeout(2000);
     await page.goto(server.url + hash);

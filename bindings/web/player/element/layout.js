@@ -22,6 +22,7 @@ const button = (id, label, key) =>
   `<button type="button" id="${id}" aria-label="${label}" title="${label} (${key})">${icon(id)}</button>`;
 
 export const LAYOUT = `<style>${style}</style>
+<div id="frame">
 <div id="stage">
   <canvas tabindex="0" role="img" aria-describedby="keys"></canvas>
   <p id="keys" class="spoken">Arrow keys turn the view, plus and minus zoom, W A S D Q E move, Z and X roll, shift and arrows pan,
@@ -51,5 +52,6 @@ export const LAYOUT = `<style>${style}</style>
   ${button("info", "About this scene", "I")}
   ${button("open", "Open a file", "O")}
   ${button("full", "Full screen", "F")}
+</div>
 </div>
 <input id="file" type="file" accept=".l4gs,application/octet-stream" hidden aria-label="Scene file">`;
