@@ -2,7 +2,7 @@
 
 use crate::atomic::write_atomically;
 use crate::error::DataError;
-use image::{ExtendedColorType, ImageEncoder, codecs::png::PngEncoder};
+use image::{ExtendedColorType, ImageEncoder, codecs::jpeg::JpegEncoder, codecs::png::PngEncoder};
 use std::path::Path;
 
 /// An image `[H, W, 3]` of bytes, row-major.
@@ -40,6 +40,19 @@ impl RgbImage8 {
     /// values is not `height * width * 3`.
     pub fn save_png(&self, path: &Path) -> Result<(), DataError> {
         save_png(path, &self.pixels, self.width, self.height, ExtendedColorType::Rgb8)
+    }
+
+    /// Writes a JPEG of a quality from 1 to 100; the file is complete or absent, never half-written.
+    ///
+    /// # Errors
+    /// As [`RgbImage8::save_png`].
+    pub fn save_jpeg(&self, path: &Path, quality: u8) -> Result<(), DataError> {
+        let (width, height, color) = (self.width, self.height, ExtendedColorType::Rgb8);
+        check_length(path, &self.pixels, width, height, color)?;
+        write_atomically(path, |out| {
+            let encoder = JpegEncoder::new_with_quality(out, quality);
+            encoder.write_image(&self.pixels, width, height, color).map_err(std::io::Error::other)
+        })
     }
 }
 
@@ -79,6 +92,19 @@ pub(crate) fn save_png(
     height: u32,
     color: ExtendedColorType,
 ) -> Result<(), DataError> {
+    check_length(path, pixels, width, height, color)?;
+    write_atomically(path, |out| {
+        PngEncoder::new(out).write_image(pixels, width, height, color).map_err(std::io::Error::other)
+    })
+}
+
+fn check_length(
+    path: &Path,
+    pixels: &[u8],
+    width: u32,
+    height: u32,
+    color: ExtendedColorType,
+) -> Result<(), DataError> {
     let channels = u64::from(color.channel_count());
     let expected = u64::from(width) * u64::from(height) * channels;
     if pixels.len() as u64 != expected || expected == 0 {
@@ -91,9 +117,7 @@ pub(crate) fn save_png(
             "pass an image whose length matches its size",
         ));
     }
-    write_atomically(path, |out| {
-        PngEncoder::new(out).write_image(pixels, width, height, color).map_err(std::io::Error::other)
-    })
+    Ok(())
 }
 
 #[cfg(test)]
@@ -119,7 +143,11 @@ mod tests {
         let mut image = RgbImage8 { width: 3, height: 2, pixels: (0..18).collect() };
         image.save_png(&path).unwrap();
         assert_eq!(image::open(&path).unwrap().into_rgb8().into_raw(), image.pixels);
+        let jpeg = folder.path().join("a.jpg");
+        image.save_jpeg(&jpeg, 85).unwrap();
+        assert_eq!(image::image_dimensions(&jpeg).unwrap(), (3, 2));
         image.pixels.pop();
+        assert!(matches!(image.save_jpeg(&jpeg, 85), Err(DataError::Image { .. })));
         assert!(matches!(image.save_png(&path), Err(DataError::Image { .. })));
     }
 }

@@ -15,17 +15,19 @@ fn a_site_has_all_that_a_static_server_needs() {
     let page = || fs::read_to_string(w.path("site/index.html")).unwrap();
     // Relative addresses: the folder works wherever it is put.
     for part in
-        ["src=\"scene.l4gs\"", "cameras=\"cameras.json\"", "src=\"light4gs-player.js\"", "content=\"preview.png\""]
+        ["src=\"scene.l4gs\"", "cameras=\"cameras.json\"", "src=\"light4gs-player.js\"", "content=\"preview.jpg\""]
     {
         assert!(page().contains(part), "{part}");
     }
     assert!(fs::read(w.path("site/scene.l4gs")).unwrap() == fs::read(scene).unwrap());
-    let picture = fs::read(w.path("site/preview.png")).unwrap();
-    let size = [16..20, 20..24].map(|range| u32::from_be_bytes(picture[range].try_into().unwrap()));
-    assert_eq!(size, [800, 600]);
+    let picture = fs::read(w.path("site/preview.jpg")).unwrap();
+    let picture = image::load_from_memory_with_format(&picture, image::ImageFormat::Jpeg).unwrap();
+    assert_eq!([picture.width(), picture.height()], [800, 600]);
 
     assert_success(&export(&["--url", "https://example.org/balls/"]));
-    assert!(page().contains("content=\"https://example.org/balls/preview.png\""));
+    assert!(page().contains("content=\"https://example.org/balls/preview.jpg\""));
+    assert_success(&export(&["--title", "Two balls & a tree"]));
+    assert!(page().contains("<title>Two balls &amp; a tree"), "{}", page());
     fs::write(w.path("site/thesis.tex"), "").unwrap();
     assert_refused(&export(&[]), &["site holds other files", "thesis.tex"]);
     assert_refused(&w.command(["export", ".", "--site", "x", "--out", "y"]).output().unwrap(), &["--site", "--out"]);

@@ -74,6 +74,9 @@ pub(super) struct Export {
     /// The address at which the folder of --site will be. Previews of links need it.
     #[arg(long, value_name = "ADDRESS", requires = "site")]
     url: Option<String>,
+    /// The title of the page, and of previews of its link; by default the name that the file has.
+    #[arg(long, value_name = "TEXT", conflicts_with = "out")]
+    title: Option<String>,
     /// Dataset whose cameras the page offers; by default that of the run whose folder holds the file.
     #[arg(long, conflicts_with = "out")]
     scene: Option<PathBuf>,
@@ -97,6 +100,11 @@ pub(super) struct Export {
     limits: LimitsArgument,
 }
 
+/// The title of a page: what was asked for, else the name in the file.
+fn title_of<'a>(wanted: Option<&'a str>, name: &'a str) -> &'a str {
+    wanted.or(Some(name).filter(|name| !name.is_empty())).unwrap_or("A scene that moves")
+}
+
 impl Export {
     pub(super) fn run(mut self) -> Result<(), TrainError> {
         if self.file.is_dir() {
@@ -117,17 +125,14 @@ impl Export {
         check_output(html, &self.file)?;
         let (scene, name) = if is_take_file(&self.file) { self.whole_take()? } else { self.whole_scene()? };
         let cameras = dataset_cameras(&self.file, self.scene.as_deref(), MOST_CAMERAS)?;
-        let title = match name.as_str() {
-            "" => "Scene",
-            name => name,
-        };
+        let title = title_of(self.title.as_deref(), &name);
         let page = page(title, Content::Embedded { scene: &scene, cameras: &cameras }, None);
         write_atomically(html, |file| file.write_all(page.as_bytes()))?;
         say(format_args!("wrote {} ({:.2} MB)", html.display(), page.len() as f64 / 1e6))
     }
 
     fn write_site(&self, folder: &Path) -> Result<(), TrainError> {
-        site::write(folder, &self.file, self.scene.as_deref(), self.url.as_deref())
+        site::write(folder, &self.file, self.scene.as_deref(), self.title.as_deref(), self.url.as_deref())
     }
 
     /// The bytes of a scene, and its name.

@@ -13,22 +13,30 @@ use light4gs_web::page::{Content, PLAYER, Preview, page, with_preview};
 use super::super::output::say;
 use super::super::take::is_take_file;
 use super::super::view::{dataset_cameras, dataset_of};
-use super::MOST_CAMERAS;
+use super::{MOST_CAMERAS, title_of};
 
 const PAGE: &str = "index.html";
 const SCRIPT: &str = "light4gs-player.js";
 const SCENE: &str = "scene.l4gs";
 const CAMERAS: &str = "cameras.json";
-const PICTURE: &str = "preview.png";
+const PICTURE: &str = "preview.jpg";
 /// All files of such a folder, the page last: it names the others.
 const FILES: [&str; 5] = [SCRIPT, SCENE, CAMERAS, PICTURE, PAGE];
-/// Longest side of the picture, pixels: large enough for programs that show links, and some hundred kilobytes.
+/// Longest side of the picture, pixels: large enough for programs that show links.
 const PICTURE_SIDE: u32 = 800;
+/// Of its JPEG, of 100.
+const PICTURE_QUALITY: u8 = 85;
 /// Field of view of a camera where no dataset has one, radians.
 const FIELD_OF_VIEW: f32 = 0.8;
 
 /// Writes the folder. One of an earlier time is written anew; a folder with other files is refused.
-pub(super) fn write(folder: &Path, file: &Path, scene: Option<&Path>, url: Option<&str>) -> Result<(), TrainError> {
+pub(super) fn write(
+    folder: &Path,
+    file: &Path,
+    scene: Option<&Path>,
+    title: Option<&str>,
+    url: Option<&str>,
+) -> Result<(), TrainError> {
     refuse_other_files(folder)?;
     let shown = Shown::open(file)?;
     // Of the moment that is shown: what one moving camera has filmed looks right from there.
@@ -39,7 +47,7 @@ pub(super) fn write(folder: &Path, file: &Path, scene: Option<&Path>, url: Optio
     });
     let picture = shown.picture(camera)?;
     let cameras = dataset_cameras(file, scene, MOST_CAMERAS)?;
-    let title = if shown.name.is_empty() { "A scene that moves" } else { &shown.name };
+    let title = title_of(title, &shown.name);
     let base = url.map_or_else(String::new, |url| format!("{}/", url.trim_end_matches('/')));
     let content = Content::Beside { scene: SCENE, cameras: CAMERAS };
     let preview = Preview {
@@ -56,7 +64,7 @@ pub(super) fn write(folder: &Path, file: &Path, scene: Option<&Path>, url: Optio
     let mut source = fs::File::open(file).map_err(DataError::io("read", file))?;
     write_atomically(&folder.join(SCENE), |file| std::io::copy(&mut source, file).map(|_| ()))?;
     put(CAMERAS, cameras.as_bytes())?;
-    picture.save_png(&folder.join(PICTURE))?;
+    picture.save_jpeg(&folder.join(PICTURE), PICTURE_QUALITY)?;
     put(PAGE, page.as_bytes())?;
     let sizes = FILES.iter().filter_map(|name| fs::metadata(folder.join(name)).ok()).map(|metadata| metadata.len());
     say(format_args!(

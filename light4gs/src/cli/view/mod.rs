@@ -230,20 +230,23 @@ pub(super) fn dataset_cameras(file: &Path, named: Option<&Path>, most: usize) ->
 /// # Errors
 /// A named dataset that cannot be read.
 pub(super) fn dataset_of(file: &Path, named: Option<&Path>) -> Result<Option<Scene>, TrainError> {
-    if let Some(folder) = named {
-        return Ok(Some(Scene::open(folder, &load_options(&Config::default()))?));
-    }
-    // If the dataset of a run no longer exists, its file can be played all the same.
     let around = file.parent().map(|folder| if folder.as_os_str().is_empty() { Path::new(".") } else { folder });
+    // A run may read its dataset in another way than by default, or a part of it.
     let of_run = |folder: &Path| {
         let (_, record, config) = RunFolder::open(folder).ok()?;
-        Scene::open(record.dataset().ok()?, &load_options(&config)).ok()
+        Some((record.dataset().ok()?.to_owned(), config))
     };
     let of_take = |folder: &Path| {
         let folder = TakeFolder::open(folder).ok()?;
-        Scene::open(&folder.record().scene, &load_options(folder.config())).ok()
+        Some((folder.record().scene.clone(), folder.config().clone()))
     };
-    Ok(around.and_then(|folder| of_run(folder).or_else(|| of_take(folder))))
+    let found = around.and_then(|folder| of_run(folder).or_else(|| of_take(folder)));
+    if let Some(folder) = named {
+        let config = found.map_or_else(Config::default, |(_, config)| config);
+        return Ok(Some(Scene::open(folder, &load_options(&config))?));
+    }
+    // If the dataset of a run no longer exists, its file can be played all the same.
+    Ok(found.and_then(|(dataset, config)| Scene::open(&dataset, &load_options(&config)).ok()))
 }
 
 /// Asks the system to show a page. The address has been printed already, so a system without a browser is no error.
