@@ -143,7 +143,8 @@ class Scene:
         self.arms = []
         for number in range(ARMS):
             turn = TURN * (number + 0.5) / ARMS
-            self.arms.append((Mesh(f"arm {number}", ruffle(0.0, turn, number), grid_faces(ARM_POINTS, ARM_ACROSS), ribbon, rest=rest), turn))
+            arm = Mesh(f"arm {number}", ruffle(0.0, turn, number), grid_faces(ARM_POINTS, ARM_ACROSS), ribbon, rest=rest)
+            self.arms.append((arm, turn))
 
         self.tentacles = []
         for number in range(TENTACLES):
