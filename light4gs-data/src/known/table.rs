@@ -78,10 +78,11 @@ fn files_below(folder: &std::path::Path, prefix: &str) -> Vec<String> {
     let mut files = Vec::new();
     for entry in std::fs::read_dir(folder).unwrap().map(Result::unwrap) {
         let name = entry.file_name().into_string().unwrap();
-        let path = format!("{prefix}{name}");
         if name.starts_with('.') {
             continue;
-        } else if entry.path().is_dir() {
+        }
+        let path = format!("{prefix}{name}");
+        if entry.path().is_dir() {
             files.extend(files_below(&entry.path(), &format!("{path}/")));
         } else {
             files.push(path);
