@@ -97,7 +97,7 @@ class Scene:
     """See above."""
 
     seed = 1
-    samples = 18
+    samples = 48
 
     def build(self):
         """Makes everything, at time 0."""

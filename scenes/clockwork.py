@@ -82,6 +82,11 @@ def dial():
     return paint.surface(shade, 0.3, coat=0.3)
 
 
+def direction(degrees):
+    """A unit vector in the plane of the wheels, from +x toward +z."""
+    return np.array([math.cos(math.radians(degrees)), 0, math.sin(math.radians(degrees))])
+
+
 class Scene:
     """See above."""
 
@@ -116,7 +121,6 @@ class Scene:
 
         # The train, from the great wheel up: each center stands where the pitch circles touch.
         radius = {teeth: TOOTH * teeth for teeth in (GREAT, CENTER, THIRD, ESCAPE)}
-        direction = lambda degrees: np.array([math.cos(math.radians(degrees)), 0, math.sin(math.radians(degrees))])
         great = np.array([-0.08, FACE, -0.22])
         center = great + (radius[GREAT] + radius[CENTER]) * direction(40)
         third = center + (radius[CENTER] + radius[THIRD]) * direction(110)
@@ -144,14 +148,13 @@ class Scene:
                 Mesh(f"jewel {teeth} {depth}", vertices * (0.03, 0.016, 0.03) + (at[0], depth, at[2]), faces,
                      plain(f"ruby {teeth} {depth}", "#c01038", 0.1, coat=1.0), still=True)
 
-        # The dial in front, with the hands on the great wheel's arbor's height.
+        # The dial in front, with the hands.
         self.dial_at = np.array([0.0, -0.215, 0.30])
         ring, faces = lathe([(.235, -.012), (.365, -.012), (.37, 0), (.365, .012), (.235, .012), (.23, 0), (.235, -.012)], 120)
         ring = ring @ rotation((1, 0, 0), math.pi / 2).T
         Mesh("dial", ring + self.dial_at, faces, dial(), rest=ring, smooth=False, still=True)
         vertices, faces = sphere(32, 16)
         Mesh("hub", vertices * (0.035, 0.03, 0.035) + self.dial_at, faces, gold, rest=vertices, still=True)
-        vertices, faces = box(0.03, 0.05, 0.08, 0.01, 2)
         for side in (-1, 1):
             vertices, faces = tube(self.dial_at + np.array([[side * .365, .012, 0], [side * .50, .06, 0]]), 0.016, 16)
             Mesh(f"dial arm {side}", vertices, faces, gold, still=True)

@@ -206,7 +206,7 @@ class Scene:
     """See above."""
 
     seed = 3
-    samples = 18
+    samples = 20
 
     def build(self):
         """Makes everything, at time 0."""

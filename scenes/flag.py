@@ -181,7 +181,8 @@ class Scene:
             vertices = vertices @ rotation((1, 0, 0), -math.pi / 2).T
             Mesh(f"{name} axle", vertices + center, faces, clouded(f"{name} axle", "#303035", "#5a5a60", 9, 0.3, 1.0), rest=vertices, smooth=False, still=True)
         vertices, faces = lathe([(0, 0), (.20, 0), (.20, .05), (.15, .08), (.12, .12), (.115, .24), (.16, .28), (.16, .31), (0, .31)], 64)
-        Mesh("pedestal", vertices + np.array([KNOT[0], KNOT[1], BASE]), faces, clouded("marble", "#9aa0a8", "#f4f4f2", 6, 0.25), rest=vertices, smooth=False, still=True)
+        marble = clouded("marble", "#9aa0a8", "#f4f4f2", 6, 0.25)
+        Mesh("pedestal", vertices + np.array([KNOT[0], KNOT[1], BASE]), faces, marble, rest=vertices, smooth=False, still=True)
         self.knot, faces = tube(knot_path(), 0.058, KNOT_AROUND, closed=True)
         along, around = np.meshgrid(np.arange(KNOT_POINTS) / KNOT_POINTS, np.arange(KNOT_AROUND) / KNOT_AROUND, indexing="ij")
         # There and back again, so that the paint has no seam.

@@ -132,7 +132,7 @@ class Scene:
 
         vertices, _, _ = bell(0.0)
         rows = 2 * BELL_DOWN
-        faces = [face for face in grid_faces(rows, BELL_AROUND, wrap_columns=True)]
+        faces = grid_faces(rows, BELL_AROUND, wrap_columns=True)
         down = np.concatenate([np.linspace(0, 1, BELL_DOWN), np.linspace(1, 0, BELL_DOWN)])
         self.bell = Mesh("bell", vertices, faces, bell_paint())
         self.bell.attribute("down", np.repeat(down, BELL_AROUND)[:, None] * (1, 0, 0))
@@ -143,7 +143,8 @@ class Scene:
         self.arms = []
         for number in range(ARMS):
             turn = TURN * (number + 0.5) / ARMS
-            self.arms.append((Mesh(f"arm {number}", ruffle(0.0, turn, number), grid_faces(ARM_POINTS, ARM_ACROSS), ribbon, rest=rest), turn))
+            arm = Mesh(f"arm {number}", ruffle(0.0, turn, number), grid_faces(ARM_POINTS, ARM_ACROSS), ribbon, rest=rest)
+            self.arms.append((arm, turn))
 
         self.tentacles = []
         for number in range(TENTACLES):
@@ -156,7 +157,8 @@ class Scene:
             vertices, faces = tube(points, self._thickness(), 10)
             rest = np.repeat(np.linspace(0, 1, TENTACLE_POINTS), 10)
             rest = np.concatenate([rest, [0, 1]])[:, None] * (1, 0, 0)
-            self.tentacles.append(Mesh(f"tentacle {number}", vertices, faces, paint.surface(shade, 0.35, glow=paint.mix(0.9, shade, (0, 0, 0))), rest=rest))
+            material = paint.surface(shade, 0.35, glow=paint.mix(0.9, shade, (0, 0, 0)))
+            self.tentacles.append(Mesh(f"tentacle {number}", vertices, faces, material, rest=rest))
         self.move(0.0)
 
     @staticmethod
@@ -192,7 +194,8 @@ class Scene:
         vertices, radius, rim = bell(time)
         # It rises as it closes, and sinks while it opens.
         at = np.array([0.06 * math.sin(TURN * time), 0.05 * math.cos(TURN * time), 0.52 + 0.11 * math.sin(TURN * (BEATS * time - 0.30))])
-        lean = rotation((1, 0, 0), 0.10 * math.sin(TURN * time)) @ rotation((0, 1, 0), 0.12 * math.cos(TURN * time)) @ rotation((0, 0, 1), 0.35 * math.sin(TURN * time))
+        lean = rotation((1, 0, 0), 0.10 * math.sin(TURN * time)) @ rotation((0, 1, 0), 0.12 * math.cos(TURN * time))
+        lean = lean @ rotation((0, 0, 1), 0.35 * math.sin(TURN * time))
 
         def placed(points):
             return points @ lean.T + at

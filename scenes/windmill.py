@@ -6,7 +6,7 @@ import numpy as np
 
 from kit.meshes import Mesh
 from kit.motion import TURN, rotation
-from kit.paint import Paint, clouded, color, plain
+from kit.paint import Paint, clouded, color
 from kit.shapes import box, joined, lathe, sphere, tube
 from kit.studio import lamp, quick_bounces, sky, sun
 

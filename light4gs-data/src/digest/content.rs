@@ -26,9 +26,12 @@ impl Content {
         sampled(path).map_err(DataError::io("read", path))
     }
 
-    /// The first 8 hexadecimal digits of the hash: enough to notice a file that was damaged or replaced, not a forgery.
-    pub(crate) fn short(&self) -> &str {
-        self.hash.get(..8).unwrap_or_default()
+    /// Length and hash as 8 hexadecimal digits: enough to notice a file that was damaged or replaced, not a forgery.
+    pub(crate) fn short(&self) -> String {
+        let mut hash = Sha256::new();
+        hash.update(self.length.to_le_bytes());
+        hash.update(self.hash.as_bytes());
+        hexadecimal(&hash.finalize()[..4])
     }
 }
 

@@ -86,10 +86,8 @@ impl KnownCopy {
         let expected: BTreeMap<String, String> = scene.files.expanded();
         let files = expected.len();
         for (file, hash) in expected {
-            let found = read.entry(file.clone()).or_insert_with(|| {
-                let content = Content::of(&folder.join(&file)).ok()?;
-                Some(content.short().to_owned())
-            });
+            let found =
+                read.entry(file.clone()).or_insert_with(|| Some(Content::of(&folder.join(&file)).ok()?.short()));
             match found {
                 Some(found) if *found == hash => {}
                 Some(_) => differing.push(file),
@@ -139,7 +137,6 @@ impl fmt::Display for KnownCopy {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::digest::Content;
     use std::fs;
 
     fn folder_with(files: &[(&str, &str)]) -> tempfile::TempDir {
@@ -242,10 +239,16 @@ mod tests {
         fs::write(&path, serde_json::to_string_pretty(&scenes).unwrap() + "\n").unwrap();
     }
 
+    /// Of a large file samples are read, and its length counts as well.
     #[test]
-    fn the_hash_of_a_small_file_is_that_of_its_bytes() {
-        let folder = folder_with(&[("a", "abc")]);
-        // The first four bytes of the SHA-256 of "abc".
-        assert_eq!(Content::of(&folder.path().join("a")).unwrap().short(), "ba7816bf");
+    fn a_byte_behind_a_large_file_is_noticed() {
+        let folder = folder_with(&FILES);
+        let large = folder.path().join("train/r_0.png");
+        fs::write(&large, vec![7; 100_000]).unwrap();
+        let known = [scene_of("balls", folder.path())];
+        for length in [99_999, 100_001] {
+            fs::write(&large, vec![7; length]).unwrap();
+            assert_eq!(KnownCopy::among(&known, folder.path()).unwrap().differing, ["train/r_0.png"], "{length}");
+        }
     }
 }
