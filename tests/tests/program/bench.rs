@@ -20,7 +20,7 @@ fn bench_prints_a_table_and_json() {
     assert!(timed("nodes, training step") && timed("1024×1024 matmul"), "{json}");
     let command = json["command"].as_str().unwrap();
     assert!(
-        command.ends_with("light4gs bench --gaussians 200 --size 40 --repeats 1 --json --device flex"),
+        command.ends_with("light4gs-under-test bench --gaussians 200 --size 40 --repeats 1 --json --device flex"),
         "{command}"
     );
     for key in ["commit", "machine", "date"] {

@@ -220,7 +220,7 @@ fn wishes_become_keys() {
         (["--minutes", "0"], ["--minutes", "minutes"]),
         (["--minutes", "soon"], ["--minutes", "minutes"]),
         (["--pixels", "7"], ["--pixels", "8"]),
-        (["--minutes", "50000"], ["--minutes 50000", "between"]),
+        (["--minutes", "50000"], ["--minutes 50000", "give fewer minutes"]),
     ] {
         let arguments = ["train", "scene", "--config", "dnerf", "--out", "never"];
         assert_refused(&w.command(arguments).args(wish).args(["--set", "device=flex"]).output().unwrap(), &words);

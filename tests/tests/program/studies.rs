@@ -106,7 +106,7 @@ fn a_study_from_plan_to_table() {
     assert!(fs::read_to_string(w.path("study/times.csv")).unwrap().starts_with("scene,size,seed,minutes"));
     // The record is what pages are generated from.
     let record = json(&w, "study/record.json");
-    assert!(record["command"].as_str().unwrap().contains("light4gs study sizes "), "{}", record["command"]);
+    assert!(record["command"].as_str().unwrap().contains("light4gs-under-test study sizes "), "{}", record["command"]);
     assert_eq!((&record["rows"][2]["size"], &record["seeds"]), (&"medium".into(), &serde_json::json!([0])));
     assert_eq!(record["rows"][2]["bytes"].as_f64(), results["runs"][2]["bytes"].as_f64());
     assert_ne!((&record["machine"], &record["date"]), (&"unknown".into(), &"unknown".into()));

@@ -182,7 +182,7 @@ fn what_is_no_take_is_refused_with_a_remedy() {
     let jobs = w.command(["train", "rig", "--out", "x", "--jobs", "2"]).output().unwrap();
     assert_refused(&jobs, &["--jobs", "--segment"]);
     let refused = train(&w, "x", &["--minutes", "50000"]).output().unwrap();
-    assert_refused(&refused, &["--minutes 50000", "between"]);
+    assert_refused(&refused, &["--minutes 50000", "give fewer minutes"]);
     // A scene whose time is not known.
     assert_success(&w.command(["synth", "plain", "--resolution", "32", "--train-frames", "12"]).output().unwrap());
     let unknown = w.command(["train", "plain", "--segment", "1", "--out", "y", "--device", "flex"]).output().unwrap();
