@@ -260,8 +260,8 @@ export class Player extends EventTarget {
   }
 
   /** Whether {@link path} is that of one camera that moves. */
-  get isWay() {
-    return this.#path.isWay;
+  get followsOneCamera() {
+    return this.#path.isContinuous;
   }
 
   #tick = (/** @type {number} */ now) => {

@@ -22,7 +22,7 @@ const close = (found, expected) =>
 test("one camera that moves goes all the way", () => {
   const walk = Array.from({ length: 11 }, (_, k) => camera(k / 10, k, k / 10));
   const path = new Path([...walk.toReversed(), camera(0.55, 100, 0, "test")]);
-  assert.ok(path.isWay);
+  assert.ok(path.isContinuous);
   assert.equal(path.cameras.length, 11);
   for (const [time, x] of [[0, 0], [0.25, 2.5], [0.5, 5], [0.93, 9.3], [1, 10]]) {
     const at = path.at(time);
@@ -39,7 +39,7 @@ test("one camera that moves goes all the way", () => {
 test("cameras here and there are jumped between", () => {
   const places = [0, 9, 1, 8, 2, 7, 3, 6, 4, 5];
   const path = new Path(places.map((x, k) => camera(k / 9, x)));
-  assert.ok(!path.isWay);
+  assert.ok(!path.isContinuous);
   close(center(path.at(0.4 / 9)), [0, 0, 0]);
   close(center(path.at(0.6 / 9)), [9, 0, 0]);
   close(center(path.at(2)), [5, 0, 0]);
@@ -48,8 +48,8 @@ test("cameras here and there are jumped between", () => {
 test("a rig is no way, and without times there is no path", () => {
   const rig = [0, 0.5, 1].flatMap((time) => [camera(time, 0), camera(time, 1)]);
   const path = new Path(rig);
-  assert.ok(!path.isWay);
+  assert.ok(!path.isContinuous);
   close(center(path.at(0.6)), [0, 0, 0]);
   assert.equal(new Path([{ ...LENS, rotation: rig[0].rotation, translation: [0, 0, 0] }]).at(0), undefined);
-  assert.ok(!new Path([camera(0, 1), camera(0.5, 1), camera(1, 1)]).isWay, "it stands still");
+  assert.ok(!new Path([camera(0, 1), camera(0.5, 1), camera(1, 1)]).isContinuous, "it stands still");
 });

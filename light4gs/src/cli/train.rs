@@ -204,14 +204,13 @@ pub(super) fn train_to_evaluation(
             "{out} holds a run of another configuration or scene; name another folder, or remove that one"
         )));
     }
+    let data = Scene::open(record.dataset()?, &load_options(&config))?;
     let coded = config.compression.profile.coded().is_some();
     // `bit_maps.json` is the last file that encoding writes.
     if !folder.stream().exists() || (coded && !folder.path("bit_maps.json").exists()) {
-        let data = Scene::open(record.dataset()?, &load_options(&config))?;
-        training.train(config.clone(), data, &folder, output)?;
+        training.train(config.clone(), data.clone(), &folder, output)?;
     }
-    let scene = Scene::open(record.dataset()?, &load_options(&config))?;
-    training.evaluate(&folder, &config, &scene)
+    training.evaluate(&folder, &config, &data)
 }
 
 /// Checks what a run needs from its first iteration to its evaluation: the device, the dataset, files for metrics. It

@@ -103,7 +103,7 @@ export declare class Player extends EventTarget {
     /** The training cameras in the order of their times: the path that {@link following} takes. */
     get path(): import("./views/camera.js").DatasetCamera[];
     /** Whether {@link path} is that of one camera that moves. */
-    get isWay(): boolean;
+    get followsOneCamera(): boolean;
     /** The share of the canvas's pixels along each side that is drawn while something moves: 1 if there is time for all. */
     get draftScale(): number;
     /**

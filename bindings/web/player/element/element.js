@@ -229,7 +229,7 @@ export class L4gsPlayer extends (globalThis.HTMLElement ?? class {}) {
       this.player = new Player(this.canvas, scene, { cameras, loop, autoplay: playing, time, camera, home, renderer });
       this.player.speed = speed;
       // What a single camera has seen is known from its path only.
-      this.player.following = before?.following ?? (scene instanceof Take && this.player.isWay);
+      this.player.following = before?.following ?? (scene instanceof Take && this.player.followsOneCamera);
       if (this.player.controls) this.player.controls.flying = flying;
       if (background) this.player.background = background;
       else if (this.getAttribute("background")) this.#setBackground(this.getAttribute("background") ?? "");

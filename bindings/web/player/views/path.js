@@ -17,7 +17,7 @@ export class Path {
       .filter(({ split, time }) => (split ?? "train") === "train" && time !== undefined)
       .sort((a, b) => (a.time ?? 0) - (b.time ?? 0));
     /** Whether they are one camera that moves. */
-    this.isWay = isWay(this.cameras);
+    this.isContinuous = isContinuous(this.cameras);
   }
 
   /**
@@ -32,7 +32,7 @@ export class Path {
     const [before, after] = [cameras[next - 1], cameras[next]];
     const [begin, end] = [before.time ?? 0, after.time ?? 0];
     const share = (time - begin) / (end - begin);
-    if (this.isWay) return between(before, after, share, time);
+    if (this.isContinuous) return between(before, after, share, time);
     // Of several at one time, the first.
     const nearest = share > 0.5 ? after : before;
     return cameras.find((camera) => camera.time === nearest.time);
@@ -40,7 +40,7 @@ export class Path {
 }
 
 /** @param {DatasetCamera[]} cameras  in the order of their times */
-function isWay(cameras) {
+function isContinuous(cameras) {
   const places = cameras.map(center);
   const steps = cameras.slice(1).map((camera, index) => ({
     seconds: (camera.time ?? 0) - (cameras[index].time ?? 0),

@@ -215,8 +215,9 @@ impl StudyFolder {
             let scene = &wanted.scenes[run.scene];
             let known = found.runs.iter().find(|known| known.name == run.name);
             let other_scene = found.scenes.iter().any(|known| known.name == scene.name && known.path != scene.path);
-            let identity = |run: &ManifestRun| (run.configuration.clone(), run.training.clone());
-            if known.is_some_and(|known| identity(known) != identity(run)) || other_scene {
+            let differs =
+                |known: &ManifestRun| known.configuration != run.configuration || known.training != run.training;
+            if known.is_some_and(differs) || other_scene {
                 return Err(TrainError::Input(format!(
                     "{root} holds run {} of another configuration or scene; name another folder with --out, or remove it",
                     run.name
