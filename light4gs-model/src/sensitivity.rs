@@ -3,7 +3,7 @@
 use burn::tensor::Tensor;
 use light4gs_data::Camera;
 
-use crate::ops::uniform_noise::add_uniform_noise;
+use crate::ops::uniform_noise::{NoiseDraw, add_uniform_noise};
 use crate::scene::gaussians::{ActivatedGaussians, GaussianTensors};
 use crate::splatter::Splatter;
 
@@ -57,8 +57,11 @@ impl Sensitivity {
             sh_rest: Tensor::from_inner(gaussians.sh_rest),
         };
         let image = splatter.render_activated(on_tape, camera, None).image;
-        let widths = Tensor::from_floats([1.0], &device);
-        let signs = add_uniform_noise(Tensor::<3>::zeros(image.dims(), &device), widths, 0, seed).sign();
+        let zeros = vec![Tensor::zeros([image.shape().num_elements()], &device)];
+        let [width, unit] = [1.0, 1.0].map(|one: f32| Tensor::from_floats([one], &device));
+        let draw = NoiseDraw { width: 0, in_units: false, seed };
+        let noise = add_uniform_noise(zeros, width, unit, vec![draw]).remove(0);
+        let signs = noise.sign().reshape(image.dims());
         let gradients = (image * Tensor::from_inner(signs)).sum().backward();
         let Some(gradient) = opacities.grad(&gradients) else { return };
         let changes: Vec<f32> = (gradient * gaussians.opacities).into_data().iter().collect();

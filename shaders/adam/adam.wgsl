@@ -3,6 +3,8 @@
 // Each invocation computes one number. It reads the four old arrays and writes the three new ones, in all of which a tensor has the
 // same place.
 
+// #include tensors
+
 struct Tensors {
     count: u32,
     // Numbers of all tensors, with the gaps between them.
@@ -36,17 +38,7 @@ fn main(
     if (i >= tensors.total) {
         return;
     }
-    // The last tensor that does not begin behind this number.
-    var tensor = 0u;
-    var behind = tensors.count;
-    while (behind - tensor > 1u) {
-        let middle = (tensor + behind) / 2u;
-        if (tensors.places[middle].x <= i) {
-            tensor = middle;
-        } else {
-            behind = middle;
-        }
-    }
+    let tensor = tensor_at(i);
     let place = tensors.places[tensor];
     if (i - place.x >= place.y) {
         return;

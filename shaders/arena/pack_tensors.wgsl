@@ -1,11 +1,11 @@
-// Several tensors in one buffer, each where its place begins.
+// Several tensors in one buffer, each where its place begins; or sums of tensors of one length.
 //
-// One invocation owns one number. Tensors that do not exist have the length 0.
+// One invocation owns one number of a place. Tensors that do not exist, and those that are added to an earlier one, have the length 0.
 
 struct Tensors {
     // Numbers of the longest one.
     longest: u32,
-    // Of each tensor: its length, and where it begins.
+    // Of each tensor: its length, where it begins, and the number of tensors from it on that are added up there.
     places: array<vec4<u32>, 7>,
 }
 
@@ -45,6 +45,10 @@ fn main(
     let i = own % tensors.longest;
     let place = tensors.places[tensor];
     if (i < place.x) {
-        packed[place.y + i] = value_at(tensor, i);
+        var sum = value_at(tensor, i);
+        for (var part = 1u; part < place.z; part++) {
+            sum += value_at(tensor + part, i);
+        }
+        packed[place.y + i] = sum;
     }
 }

@@ -2,6 +2,8 @@
 //
 // A workgroup owns a block of BLOCK numbers of `image` and `truth`, and writes its sum to `sums`.
 
+// #include workgroup_sum
+
 struct Parameters {
     count: u32,
 }
@@ -10,8 +12,6 @@ struct Parameters {
 @group(0) @binding(1) var<storage, read_write> truth: array<f32>;
 @group(0) @binding(2) var<storage, read_write> sums: array<f32>;
 @group(0) @binding(3) var<uniform> parameters: Parameters;
-
-var<workgroup> totals: array<f32, WORKGROUP>;
 
 @compute @workgroup_size(WORKGROUP)
 fn main(
@@ -26,15 +26,8 @@ fn main(
         let difference = image[i] - truth[i];
         sum += select(abs(difference), difference * difference, SQUARED == 1u);
     }
-    totals[lane] = sum;
-    workgroupBarrier();
-    for (var step = WORKGROUP / 2u; step > 0u; step = step / 2u) {
-        if (lane < step) {
-            totals[lane] += totals[lane + step];
-        }
-        workgroupBarrier();
-    }
+    let total = workgroup_sum(sum, lane);
     if (lane == 0u && block * BLOCK < parameters.count) {
-        sums[block] = totals[0];
+        sums[block] = total;
     }
 }

@@ -2,6 +2,8 @@
 //
 // The only workgroup reads `sums` and writes their sum, divided by `divisor`, to `mean[0]`.
 
+// #include workgroup_sum
+
 struct Parameters {
     blocks: u32,
     divisor: f32,
@@ -11,8 +13,6 @@ struct Parameters {
 @group(0) @binding(1) var<storage, read_write> mean: array<f32>;
 @group(0) @binding(2) var<uniform> parameters: Parameters;
 
-var<workgroup> totals: array<f32, WORKGROUP>;
-
 @compute @workgroup_size(WORKGROUP)
 fn main(
     @builtin(local_invocation_index) lane: u32,
@@ -21,15 +21,8 @@ fn main(
     for (var i = lane; i < parameters.blocks; i += WORKGROUP) {
         sum += sums[i];
     }
-    totals[lane] = sum;
-    workgroupBarrier();
-    for (var step = WORKGROUP / 2u; step > 0u; step = step / 2u) {
-        if (lane < step) {
-            totals[lane] += totals[lane + step];
-        }
-        workgroupBarrier();
-    }
+    let total = workgroup_sum(sum, lane);
     if (lane == 0u) {
-        mean[0] = totals[0] / parameters.divisor;
+        mean[0] = total / parameters.divisor;
     }
 }

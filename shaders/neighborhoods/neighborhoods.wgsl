@@ -1,18 +1,21 @@
-// Some rows of a table [N, C] and their neighbors, each as a column of the result [3 C, M]: the numbers of the row, the means over
-// its neighbors, the numbers of the nearest one.
+// Some rows of tables with C columns together and their neighbors, each as a column of the result [3 C, M]: the numbers of the row,
+// the means over its neighbors, the numbers of the nearest one.
 //
 // One invocation owns one number of the result.
+
+// #include tables
 
 struct Parameters {
     // M, C, neighbors of each row
     count: u32,
     columns: u32,
     neighbors: u32,
+    tables: Tables,
 }
 
 // [M], then [M, neighbors], the nearest first
 @group(0) @binding(0) var<storage, read_write> rows: array<u32>;
-@group(0) @binding(1) var<storage, read_write> table: array<f32>;
+@group(0) @binding(1) var<storage, read_write> numbers: array<f32>;
 @group(0) @binding(2) var<storage, read_write> result: array<f32>;
 @group(0) @binding(3) var<uniform> parameters: Parameters;
 
@@ -32,13 +35,14 @@ fn main(
     let column = i / count % columns;
     let part = i / count / columns;
     let nearest = count + m * parameters.neighbors;
+    let table = table_of(column);
     if (part == 1u) {
         var sum = 0.0;
         for (var k = 0u; k < parameters.neighbors; k++) {
-            sum += table[rows[nearest + k] * columns + column];
+            sum += numbers[place_of(table, rows[nearest + k], column)];
         }
         result[i] = sum / f32(parameters.neighbors);
     } else {
-        result[i] = table[rows[select(m, nearest, part == 2u)] * columns + column];
+        result[i] = numbers[place_of(table, rows[select(m, nearest, part == 2u)], column)];
     }
 }

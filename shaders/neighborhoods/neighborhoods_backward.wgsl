@@ -1,7 +1,9 @@
-// Derivative of rows of a table and their neighbors: every number of the table adds up its gradients.
+// Derivative of rows of tables and their neighbors: every number of a table adds up its gradients.
 //
-// One invocation owns one number of the table [N, C]. Its row was chosen at `places[starts[row]..starts[row + 1]]`, where the first M
+// One invocation owns one number of the tables, which have N rows and C columns together. Its row was chosen at `places[starts[row]..starts[row + 1]]`, where the first M
 // places are those of the rows themselves; the sum is in their order.
+
+// #include tables
 
 struct Parameters {
     // N, C, M, neighbors of each row
@@ -9,6 +11,7 @@ struct Parameters {
     columns: u32,
     count: u32,
     neighbors: u32,
+    tables: Tables,
 }
 
 @group(0) @binding(0) var<storage, read_write> starts: array<u32>;
@@ -46,5 +49,5 @@ fn main(
             sum += own;
         }
     }
-    sums[i] = sum;
+    sums[place_of(table_of(column), row, column)] = sum;
 }

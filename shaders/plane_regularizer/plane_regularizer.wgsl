@@ -3,6 +3,8 @@
 // A workgroup owns BLOCK numbers of the planes, which lie one after another, each where its gradients begin. Reads the planes. Writes
 // the sum of the workgroup's terms, and the gradients for a loss that counts once.
 
+// #include workgroup_sum
+
 struct Parameters {
     // Numbers of all planes, with the gaps between them.
     count: vec4<u32>,
@@ -21,8 +23,6 @@ struct Parameters {
 @group(0) @binding(6) var<storage, read_write> sums: array<f32>;
 @group(0) @binding(7) var<storage, read_write> gradients: array<f32>;
 @group(0) @binding(8) var<uniform> parameters: Parameters;
-
-var<workgroup> totals: array<f32, WORKGROUP>;
 
 fn value_at(plane: u32, i: u32) -> f32 {
     switch plane {
@@ -75,15 +75,8 @@ fn main(
             gradients[number] = 2.0 * weights.x * around + weights.y * sign(off);
         }
     }
-    totals[lane] = sum;
-    workgroupBarrier();
-    for (var step = WORKGROUP / 2u; step > 0u; step = step / 2u) {
-        if (lane < step) {
-            totals[lane] += totals[lane + step];
-        }
-        workgroupBarrier();
-    }
+    let total = workgroup_sum(sum, lane);
     if (lane == 0u && block * BLOCK < parameters.count.x) {
-        sums[block] = totals[0];
+        sums[block] = total;
     }
 }

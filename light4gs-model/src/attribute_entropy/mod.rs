@@ -19,7 +19,7 @@ use crate::entropy::gaussian_conditional::LIKELIHOOD_BOUND;
 use crate::entropy::logistic_mixture::{LogisticMixture, LogisticMixtureConfig};
 use crate::gpu_error::GpuError;
 use crate::ops::neighborhoods::{Neighborhoods, neighborhoods};
-use crate::ops::uniform_noise::add_uniform_noise;
+use crate::ops::uniform_noise::{NoiseDraw, add_uniform_noise};
 use crate::scene::attributes::{Attribute, MEANS};
 use crate::scene::{AttributeMapper, GaussianTensors};
 pub use prediction::ChannelPrediction;
@@ -88,11 +88,11 @@ impl AttributeEntropy {
         let gaussians = gaussians.clone().inner();
         let rows: Vec<u32> = (0..gaussians.means.dims()[0] as u32).collect();
         let neighbors = neighbors_of(self.places(gaussians.means.clone()).order.as_ref(), &rows);
-        let table = self.table(gaussians);
-        let numbers: Vec<f32> = table.clone().into_data().iter().collect();
+        let tables = self.tables(gaussians);
+        let numbers: Vec<f32> = Tensor::cat(tables.clone(), 1).into_data().iter().collect();
         let weights = self.prediction.fit(&numbers, &neighbors);
         replace(&mut self.prediction.weights, off_tape(weights));
-        let inputs = neighborhoods(table, Neighborhoods::new(&rows, &neighbors, rows.len()));
+        let inputs = neighborhoods(tables, Neighborhoods::new(&rows, &neighbors, rows.len()));
         let values = off_tape(self.prediction.residuals(on_tape_of(&self.size.val(), inputs)));
         let least = self.by_channel(off_tape(self.log_steps.val()).exp()) * LEAST_SPREAD;
         // [C, 1].
@@ -112,28 +112,47 @@ impl AttributeEntropy {
 
     /// The Gaussians with uniform noise as wide as the steps, off the tape. The same seed gives the same noise.
     pub fn add_noise(&self, gaussians: GaussianTensors, seed: u64) -> GaussianTensors {
-        struct Noise<'a> {
-            model: &'a AttributeEntropy,
-            /// `[A]`.
-            steps: Tensor<1>,
-            /// `[A]`, times the size of Gaussians: positions have such a step.
-            sized: Tensor<1>,
-            seed: u64,
+        /// The place of an attribute that gets noise.
+        fn place<const D: usize>(model: &AttributeEntropy, name: &str, values: &Tensor<D>) -> Option<usize> {
+            // With spherical harmonics of degree 0 alone, `sh_rest` is empty.
+            model.place(name).filter(|_| values.shape().num_elements() > 0)
         }
-        impl AttributeMapper for Noise<'_> {
+        struct Take<'a> {
+            model: &'a AttributeEntropy,
+            seed: u64,
+            values: Vec<Tensor<1>>,
+            draws: Vec<NoiseDraw>,
+        }
+        impl AttributeMapper for Take<'_> {
             fn map<const D: usize>(&mut self, attribute: &Attribute, values: Tensor<D>) -> Tensor<D> {
-                let Some(place) = self.model.place(&attribute.name) else { return untracked(values) };
-                let steps = if has_density(&attribute.name) { &self.steps } else { &self.sized };
-                // Attributes are as far apart in the seeds as can be (the golden ratio in 64 bits).
-                let seed = self.seed.wrapping_add((place as u64 + 1).wrapping_mul(0x9e37_79b9_7f4a_7c15));
-                let device = values.device();
-                let noisy = add_uniform_noise(off_tape(values), steps.clone(), place, seed);
-                if device.is_autodiff() { Tensor::from_inner(noisy) } else { noisy }
+                if let Some(width) = place(self.model, &attribute.name, &values) {
+                    // Attributes are as far apart in the seeds as can be (the golden ratio in 64 bits).
+                    let seed = self.seed.wrapping_add((width as u64 + 1).wrapping_mul(0x9e37_79b9_7f4a_7c15));
+                    // The step of positions counts in the Gaussians' size.
+                    self.draws.push(NoiseDraw { width, in_units: !has_density(&attribute.name), seed });
+                    self.values.push(off_tape(values.clone()).reshape([-1]));
+                }
+                values
             }
         }
+        struct Replace<'a> {
+            model: &'a AttributeEntropy,
+            noisy: std::vec::IntoIter<Tensor<1>>,
+        }
+        impl AttributeMapper for Replace<'_> {
+            fn map<const D: usize>(&mut self, attribute: &Attribute, values: Tensor<D>) -> Tensor<D> {
+                if place(self.model, &attribute.name, &values).is_none() {
+                    return untracked(values);
+                }
+                let noisy = self.noisy.next().expect("as many as were taken").reshape(values.dims());
+                if values.device().is_autodiff() { Tensor::from_inner(noisy) } else { noisy }
+            }
+        }
+        let mut taken = Take { model: self, seed, values: Vec::new(), draws: Vec::new() };
+        let _ = gaussians.clone().map(&mut taken);
         let steps = off_tape(self.log_steps.val()).exp();
-        let sized = steps.clone() * off_tape(self.size.val());
-        gaussians.map(&mut Noise { model: self, steps, sized, seed })
+        let noisy = add_uniform_noise(taken.values, steps, off_tape(self.size.val()), taken.draws);
+        gaussians.map(&mut Replace { model: self, noisy: noisy.into_iter() })
     }
 
     /// An estimate of the bits of all attributes of all Gaussians, `[1]`, from some rows: the densities see only these and their
@@ -181,7 +200,7 @@ impl AttributeEntropy {
         };
         let share = count as f64 / rows.len().max(1) as f64;
         let chosen = Neighborhoods::new(rows, &neighbors_of(order.as_ref(), rows), count);
-        let residuals = self.prediction.residuals(neighborhoods(self.table(gaussians), chosen));
+        let residuals = self.prediction.residuals(neighborhoods(self.tables(gaussians), chosen));
         let widths = self.by_channel(self.log_steps.val().exp());
         let bits = self.mixture.interval_bits(residuals, widths, LIKELIHOOD_BOUND);
         let corrections = self.by_channel(untracked(self.corrections.val())).squeeze_dim::<1>(1);
@@ -287,8 +306,8 @@ impl AttributeEntropy {
         numbers.select(0, places).unsqueeze_dim(1)
     }
 
-    /// All numbers with a density, `[N, C]`.
-    fn table(&self, gaussians: GaussianTensors) -> Tensor<2> {
+    /// All numbers with a density: a table for each attribute, with N rows, and C columns together.
+    fn tables(&self, gaussians: GaussianTensors) -> Vec<Tensor<2>> {
         struct Collect<'a>(&'a AttributeEntropy, Vec<Option<Tensor<2>>>);
         impl AttributeMapper for Collect<'_> {
             fn map<const D: usize>(&mut self, attribute: &Attribute, values: Tensor<D>) -> Tensor<D> {
@@ -301,7 +320,7 @@ impl AttributeEntropy {
         }
         let mut found = Collect(self, vec![None; self.attributes.len()]);
         let _ = gaussians.map(&mut found);
-        Tensor::cat(found.1.into_iter().flatten().collect(), 1)
+        found.1.into_iter().flatten().collect()
     }
 }
 

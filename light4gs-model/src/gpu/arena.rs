@@ -1,5 +1,7 @@
 //! Tensors in one buffer, so that one launch can take any number of them.
 
+use std::ops::Range;
+
 use cubecl::server::Handle;
 use light4gs_shaders::PACK_TENSORS;
 
@@ -9,7 +11,7 @@ use super::launch::{Launch, same_memory};
 use crate::gpu_error::GpuError;
 
 /// Tensors that one launch of `pack_tensors` takes.
-const PACKED: usize = 7;
+pub(crate) const PACKED: usize = 7;
 
 /// The kernel of this file.
 pub(super) fn kernels() -> Vec<Kernel> {
@@ -36,22 +38,39 @@ impl Arena {
         if let Some(buffer) = common_buffer(tensors, &places) {
             return Ok(Self { buffer, places });
         }
+        let parts: Vec<&[Handle]> = tensors.chunks(1).collect();
+        Self::of_sums(gpu, name, &parts, lengths)
+    }
+
+    /// The sums of tensors of these lengths, [`PACKED`] and fewer in each sum, added up in their order.
+    pub(crate) fn of_sums(
+        gpu: &Gpu,
+        name: &'static str,
+        sums: &[&[Handle]],
+        lengths: &[usize],
+    ) -> Result<Self, GpuError> {
         let arena = Self::new(gpu, name, lengths)?;
-        for first in (0..tensors.len()).step_by(PACKED) {
-            let end = tensors.len().min(first + PACKED);
-            let longest = lengths[first..end].iter().copied().max().unwrap_or(0);
-            let mut uniform = vec![longest as u32, 0, 0, 0];
-            let mut launch = Launch::new(&gpu.client, PACK_TENSORS);
-            for tensor in first..first + PACKED {
-                // What is not there is bound as well.
-                if tensor < end {
-                    uniform.extend([lengths[tensor] as u32, arena.places.starts[tensor] as u32, 0, 0]);
-                    launch = launch.reads(&tensors[tensor]);
-                } else {
-                    uniform.extend([0; 4]);
-                    launch = launch.reads(&gpu.allocate("no tensor", 1)?);
-                }
+        let mut next = 0;
+        while next < sums.len() {
+            let (first, mut tensors): (usize, Vec<&Handle>) = (next, Vec::with_capacity(PACKED));
+            let mut places = [[0; 4]; PACKED];
+            while let Some(parts) = sums.get(next).filter(|parts| tensors.len() + parts.len() <= PACKED) {
+                let [length, start] = [lengths[next], arena.places.starts[next]].map(|number| number as u32);
+                places[tensors.len()] = [length, start, parts.len() as u32, 0];
+                tensors.extend(*parts);
+                next += 1;
             }
+            assert!(next > first, "no more than {PACKED} tensors are added up at once");
+            let longest = lengths[first..next].iter().copied().max().unwrap_or(0);
+            let mut launch = Launch::new(&gpu.client, PACK_TENSORS);
+            for tensor in &tensors {
+                launch = launch.reads(tensor);
+            }
+            // What is not there is bound as well.
+            for _ in tensors.len()..PACKED {
+                launch = launch.reads(&gpu.allocate("no tensor", 1)?);
+            }
+            let uniform = [&[longest as u32, 0, 0, 0], places.as_flattened()].concat();
             launch.updates_if(first > 0, &arena.buffer).uniform(&uniform).invocations(PACKED * longest)?;
         }
         Ok(arena)
@@ -61,6 +80,21 @@ impl Arena {
     pub(crate) fn tensor(&self, k: usize) -> Handle {
         self.places.of(&self.buffer, k)
     }
+}
+
+/// Tensors of these lengths in batches, each of as many as one buffer holds and no more than `most`, but of one at least.
+pub(crate) fn batches(gpu: &Gpu, lengths: &[usize], most: usize) -> Vec<Range<usize>> {
+    let mut batches = Vec::new();
+    let mut first = 0;
+    while first < lengths.len() {
+        let mut end = first + 1;
+        while end < lengths.len() && end - first < most && gpu.holds(Places::new(&lengths[first..=end]).total) {
+            end += 1;
+        }
+        batches.push(first..end);
+        first = end;
+    }
+    batches
 }
 
 /// The piece of a buffer in which all tensors lie at their places.
@@ -115,5 +149,22 @@ mod tests {
         let copied = Arena::of(&gpu, "a test", &turned, &[lengths[4], lengths[3]]).unwrap();
         assert!(!same_memory(&copied.buffer, &arena.buffer));
         assert_eq!(download(&gpu, copied.tensor(0)), values[4]);
+    }
+
+    #[test]
+    fn sums_are_made_while_tensors_are_copied() {
+        let gpu = default_gpu();
+        // Four sums of three tensors each: two launches.
+        let lengths = [5, 700, 1, 64];
+        let part = |sum: usize, part: usize| -> Vec<f32> {
+            (0..lengths[sum]).map(|i| (1000 * sum + 100 * part + i) as f32).collect()
+        };
+        let parts: Vec<Vec<Handle>> = (0..4).map(|sum| [0, 1, 2].map(|k| upload(&gpu, &part(sum, k))).into()).collect();
+        let parts: Vec<&[Handle]> = parts.iter().map(Vec::as_slice).collect();
+        let arena = Arena::of_sums(&gpu, "a test", &parts, &lengths).unwrap();
+        for (sum, length) in lengths.iter().enumerate() {
+            let expected: Vec<f32> = (0..*length).map(|i| (3000 * sum + 300 + 3 * i) as f32).collect();
+            assert_eq!(download(&gpu, arena.tensor(sum)), expected);
+        }
     }
 }

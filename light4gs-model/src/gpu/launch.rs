@@ -10,6 +10,7 @@ use cubecl::ir::attributes::BufferIOAttr;
 use cubecl::prelude::{CubeCount, CubeDim};
 use cubecl::server::{Handle, KernelArguments, MetadataBindingInfo};
 
+use super::counting;
 use super::kernel::{Constants, Kernel};
 use super::recording::{self, RecordedBuffer, RecordedLaunch};
 use crate::gpu_error::{GpuError, first_lines};
@@ -116,6 +117,7 @@ impl<'a> Launch<'a> {
         let key = (self.client.service_id().device, name, self.kernel.constants.clone());
         let cube_dim = CubeDim::new_1d(self.kernel.workgroup);
         let kernel = SourceKernel::new(self.kernel.clone(), cube_dim);
+        counting::launching(name);
         self.client.launch(Box::new(kernel), CubeCount::Static(groups[0], groups[1], 1), arguments);
 
         let mut launched = LAUNCHED.lock().unwrap_or_else(|poisoned| poisoned.into_inner());

@@ -14,10 +14,22 @@ use burn::tensor::{DType, Shape};
 use burn_fusion::custom::{CustomOpIr, OperationIr, StreamId, TensorIr};
 use burn_fusion::{Fusion, FusionBackend, FusionTensor, NoOp, get_client};
 
+use super::tensor_list::TensorList;
+
 /// The tensor itself, after everything that it depends on has been launched.
 pub(super) fn resolve<B: FusionBackend>(tensor: FloatTensor<Fusion<B>>) -> FloatTensor<B> {
     let client = tensor.client.clone();
     client.resolve_tensor_float::<B>(tensor)
+}
+
+/// The tensors of a list themselves.
+pub(super) fn resolve_all<B: FusionBackend>(list: TensorList<Fusion<B>>) -> TensorList<B> {
+    TensorList(list.0.into_iter().map(resolve::<B>).collect())
+}
+
+/// The tensors of a list as leaves of the stream.
+pub(super) fn leaves<B: FusionBackend>(list: TensorList<B>) -> TensorList<Fusion<B>> {
+    TensorList(list.0.into_iter().map(leaf::<B>).collect())
 }
 
 /// A float tensor as a leaf of the stream.

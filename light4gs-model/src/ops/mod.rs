@@ -29,6 +29,7 @@ pub mod mixture_bits;
 pub mod neighborhoods;
 pub mod node_poses;
 pub mod node_regularizer;
+pub mod noise_gradient;
 pub mod normal_cdf;
 pub mod plane_query;
 pub mod plane_regularizer;
@@ -37,6 +38,7 @@ mod sample;
 pub mod significance;
 pub mod skinning;
 pub mod splat;
+pub mod sums;
 pub mod tensor_list;
 pub mod uniform_noise;
 
@@ -68,12 +70,14 @@ pub const ON_GPU: &[GpuOperation] = &[
     neighborhoods::gpu::OPERATION,
     node_poses::gpu::OPERATION,
     node_regularizer::gpu::OPERATION,
+    noise_gradient::gpu::OPERATION,
     normal_cdf::gpu::OPERATION,
     plane_query::gpu::OPERATION,
     plane_regularizer::gpu::OPERATION,
     significance::gpu::OPERATION,
     skinning::gpu::OPERATION,
     splat::gpu::OPERATION,
+    sums::gpu::OPERATION,
     uniform_noise::gpu::OPERATION,
 ];
 

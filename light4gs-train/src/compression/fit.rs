@@ -56,7 +56,7 @@ pub fn fit<F: DeformationField, E: EntropyModels>(
         let mut gradients = GradientSums::default();
         gradients.add_module(&compression, &mut rate.megabytes().backward());
         // The steps do not change: there is no distortion here against which their rate could be weighed.
-        adam.step_module(COMPRESSION, &mut compression, &mut gradients, |group, _| match group {
+        adam.step_modules(&mut [(COMPRESSION, &mut compression)], &mut gradients, |group, _| match group {
             ParameterGroup::Context => Some(context.at(iteration as f64)),
             ParameterGroup::ShModel => Some(sh.at(iteration as f64)),
             _ => None,

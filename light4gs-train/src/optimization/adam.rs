@@ -5,7 +5,7 @@ use std::collections::{BTreeMap, HashMap};
 use burn::module::{Module, Param, ParamId};
 use burn::tensor::{Device, Int, Shape, Tensor};
 use light4gs_model::ops::adam::{AdamStep, SteppedParameter, adam_steps};
-use light4gs_model::parameters::{ParameterMapper, update_parameters};
+use light4gs_model::parameters::{ParameterMapper, ParameterVisitor, update_parameters, visit_parameters};
 
 use super::gradients::GradientSums;
 use super::parameters::ParameterGroup;
@@ -29,17 +29,27 @@ pub struct Adam {
 }
 
 impl Adam {
-    /// Steps every parameter of a module that has a gradient and a learning rate. `rate` gives the rate by group and
-    /// path. `prefix` is put before the module's paths; it may be empty.
-    pub fn step_module<M: Module>(
+    /// Steps every parameter of these modules that has a gradient and a learning rate, all at once: on a GPU that is one
+    /// launch. `rate` gives the rate by group and path. The paths of a module follow the prefix beside it, which may be empty.
+    pub fn step_modules(
         &mut self,
-        prefix: &str,
-        module: &mut M,
+        modules: &mut [(&str, &mut dyn SteppedModule)],
         gradients: &mut GradientSums,
         rate: impl Fn(ParameterGroup, &str) -> Option<f64>,
     ) {
-        let mut take = Take { adam: self, prefix, gradients, rate, names: Vec::new(), begun: Vec::new() };
-        update_parameters(module, &mut take);
+        let mut wanted = Wanted { prefix: "", rate: &rate, found: Vec::new() };
+        for (prefix, module) in modules.iter() {
+            wanted.prefix = prefix;
+            module.look(&mut wanted);
+        }
+        let found = gradients.remove(&wanted.found.iter().map(|(id, _)| *id).collect::<Vec<_>>());
+        let steps = wanted.found.into_iter().zip(found);
+        let steps = steps.filter_map(|((id, rate), gradient)| Some((id, (rate, gradient?)))).collect();
+        let mut take = Take { adam: self, prefix: "", steps, names: Vec::new(), begun: Vec::new() };
+        for (prefix, module) in modules.iter_mut() {
+            take.prefix = prefix;
+            module.take(&mut take);
+        }
         let Take { names, begun, .. } = take;
         let times: Vec<u32> = begun.iter().map(|parameter| parameter.step.time).collect();
         let stepped = names.into_iter().zip(times).zip(adam_steps(begun));
@@ -47,8 +57,11 @@ impl Adam {
             self.finish(name.clone(), time, moments);
             (name, (shape, value))
         });
-        let values: HashMap<_, _> = values.collect();
-        update_parameters(module, &mut GiveBack { prefix, values });
+        let mut give_back = GiveBack { prefix: "", values: values.collect() };
+        for (prefix, module) in modules.iter_mut() {
+            give_back.prefix = prefix;
+            module.give_back(&mut give_back);
+        }
     }
 
     /// Steps a parameter along its gradient, which has the parameter's shape and no tape.
@@ -113,43 +126,80 @@ fn with_value<const D: usize>(id: ParamId, value: Tensor<D>) -> Param<Tensor<D>>
     Param::initialized(id, Tensor::from_inner(value).require_grad())
 }
 
-/// Takes the parameters that are stepped out of a module.
-struct Take<'a, R> {
-    adam: &'a mut Adam,
-    prefix: &'a str,
-    gradients: &'a mut GradientSums,
-    rate: R,
-    /// With their shapes.
-    names: Vec<(String, Vec<usize>)>,
-    begun: Vec<SteppedParameter>,
+/// A module of any type, for [`Adam::step_modules`].
+pub trait SteppedModule {
+    /// Lets the parameters be found that have a learning rate.
+    fn look(&self, wanted: &mut Wanted<'_>);
+    /// Lets the values of those with a gradient be taken.
+    fn take(&mut self, take: &mut Take<'_>);
+    /// Lets their new values be put back.
+    fn give_back(&mut self, give_back: &mut GiveBack<'_>);
+}
+
+impl<M: Module> SteppedModule for M {
+    fn look(&self, wanted: &mut Wanted<'_>) {
+        visit_parameters(self, wanted);
+    }
+
+    fn take(&mut self, take: &mut Take<'_>) {
+        update_parameters(self, take);
+    }
+
+    fn give_back(&mut self, give_back: &mut GiveBack<'_>) {
+        update_parameters(self, give_back);
+    }
 }
 
 fn joined(prefix: &str, path: &str) -> String {
     if prefix.is_empty() { path.to_owned() } else { format!("{prefix}.{path}") }
 }
 
-impl<R: Fn(ParameterGroup, &str) -> Option<f64>> ParameterMapper for Take<'_, R> {
-    fn map<const D: usize>(&mut self, path: &str, parameter: Param<Tensor<D>>) -> Param<Tensor<D>> {
+/// Finds the parameters that have a learning rate.
+pub struct Wanted<'a> {
+    prefix: &'a str,
+    rate: &'a dyn Fn(ParameterGroup, &str) -> Option<f64>,
+    found: Vec<(ParamId, f64)>,
+}
+
+impl ParameterVisitor for Wanted<'_> {
+    fn visit<const D: usize>(&mut self, path: &str, parameter: &Param<Tensor<D>>) {
         let name = joined(self.prefix, path);
+        // With spherical harmonics of degree 0 alone, `sh_rest` is empty: there is nothing to step, and kernels refuse empty
+        // tensors.
         if let Some(rate) = ParameterGroup::of(&name).and_then(|group| (self.rate)(group, &name))
-            && let Some(gradient) = self.gradients.remove(parameter.id)
-            // With spherical harmonics of degree 0 alone, `sh_rest` is empty: there is nothing to step, and kernels
-            // refuse empty tensors.
             && parameter.shape().num_elements() > 0
         {
-            let (id, shape) = (parameter.id, parameter.dims());
-            let empty = without_a_value(id, &gradient.device());
-            let value = parameter.into_value().inner().flatten(0, D - 1);
-            self.begun.push(self.adam.begin(&name, value, gradient, rate));
-            self.names.push((name, shape.to_vec()));
-            return empty;
+            self.found.push((parameter.id, rate));
         }
-        parameter
+    }
+}
+
+/// Takes the parameters that are stepped out of a module.
+pub struct Take<'a> {
+    adam: &'a mut Adam,
+    prefix: &'a str,
+    /// Learning rates and gradients.
+    steps: HashMap<ParamId, (f64, Tensor<1>)>,
+    /// With their shapes.
+    names: Vec<(String, Vec<usize>)>,
+    begun: Vec<SteppedParameter>,
+}
+
+impl ParameterMapper for Take<'_> {
+    fn map<const D: usize>(&mut self, path: &str, parameter: Param<Tensor<D>>) -> Param<Tensor<D>> {
+        let Some((rate, gradient)) = self.steps.remove(&parameter.id) else { return parameter };
+        let name = joined(self.prefix, path);
+        let (id, shape) = (parameter.id, parameter.dims());
+        let empty = without_a_value(id, &gradient.device());
+        let value = parameter.into_value().inner().flatten(0, D - 1);
+        self.begun.push(self.adam.begin(&name, value, gradient, rate));
+        self.names.push((name, shape.to_vec()));
+        empty
     }
 }
 
 /// Puts them back.
-struct GiveBack<'a> {
+pub struct GiveBack<'a> {
     prefix: &'a str,
     /// By name, with their shapes.
     values: HashMap<String, (Vec<usize>, Tensor<1>)>,

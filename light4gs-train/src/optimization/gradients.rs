@@ -4,6 +4,7 @@ use std::collections::HashMap;
 
 use burn::module::{Module, Param, ParamId};
 use burn::tensor::{Gradients, Tensor};
+use light4gs_model::ops::sums::sums;
 use light4gs_model::parameters::{ParameterVisitor, visit_parameters};
 
 /// Sums of gradients. Equal parts, added in the same order, give equal sums to the last bit.
@@ -12,8 +13,9 @@ use light4gs_model::parameters::{ParameterVisitor, visit_parameters};
 /// original.
 #[derive(Debug, Default)]
 pub struct GradientSums {
-    /// Flattened, without a tape.
-    sums: HashMap<ParamId, Tensor<1>>,
+    /// The parts of each, flattened, without a tape. They are added up when a sum is needed, those of all parameters at once:
+    /// on a GPU each addition would be a launch.
+    parts: HashMap<ParamId, Vec<Tensor<1>>>,
 }
 
 impl GradientSums {
@@ -22,30 +24,41 @@ impl GradientSums {
         visit_parameters(module, &mut Collect { sums: self, gradients });
     }
 
-    /// Adds the sums of another part.
+    /// Adds the parts of other sums.
     pub fn add(&mut self, other: Self) {
-        for (parameter, gradient) in other.sums {
-            self.add_one(parameter, gradient);
+        for (parameter, parts) in other.parts {
+            self.parts.entry(parameter).or_default().extend(parts);
         }
     }
 
-    /// A parameter's gradient, flattened. `None` if no part depends on it.
-    pub fn get(&self, parameter: ParamId) -> Option<Tensor<1>> {
-        self.sums.get(&parameter).cloned()
+    /// The gradients of these parameters, flattened, in their order. `None` for one that no part depends on.
+    pub fn get(&mut self, parameters: &[ParamId]) -> Vec<Option<Tensor<1>>> {
+        self.add_up(parameters);
+        parameters.iter().map(|parameter| self.parts.get(parameter).map(|parts| parts[0].clone())).collect()
     }
 
-    /// Removes and returns a parameter's gradient, flattened. `None` if no part depends on it.
-    pub fn remove(&mut self, parameter: ParamId) -> Option<Tensor<1>> {
-        self.sums.remove(&parameter)
+    /// Removes and returns the gradients of these parameters, flattened, in their order. `None` for one that no part depends on.
+    pub fn remove(&mut self, parameters: &[ParamId]) -> Vec<Option<Tensor<1>>> {
+        self.add_up(parameters);
+        parameters.iter().map(|parameter| self.parts.remove(parameter).map(|mut parts| parts.remove(0))).collect()
     }
 
     /// Adds a parameter's gradient, flattened.
     pub fn add_one(&mut self, parameter: ParamId, gradient: Tensor<1>) {
-        let sum = match self.sums.remove(&parameter) {
-            Some(sum) => sum + gradient,
-            None => gradient,
-        };
-        self.sums.insert(parameter, sum);
+        self.parts.entry(parameter).or_default().push(gradient);
+    }
+
+    /// Leaves one part of each of these parameters. If any has more, the sums of all lie side by side on a GPU, as operations on
+    /// many tensors want them.
+    fn add_up(&mut self, parameters: &[ParamId]) {
+        let parts = |parameter: &ParamId| self.parts.get(parameter).map_or(0, Vec::len);
+        if parameters.iter().any(|parameter| parts(parameter) > 1) {
+            let there: Vec<ParamId> = parameters.iter().filter(|parameter| parts(parameter) > 0).copied().collect();
+            let lists = there.iter().filter_map(|parameter| self.parts.remove(parameter)).collect();
+            for (parameter, sum) in there.into_iter().zip(sums(lists)) {
+                self.parts.insert(parameter, vec![sum]);
+            }
+        }
     }
 }
 

@@ -2,7 +2,7 @@
 //!
 //! | task | use |
 //! |---|---|
-//! | step all parameters of a module | [`Adam::step_module`](adam::Adam::step_module) |
+//! | step all parameters of some modules | [`Adam::step_modules`](adam::Adam::step_modules) |
 //! | let the optimizer follow when Gaussians are added or removed | [`GaussianEditor`](crate::density::GaussianEditor) |
 //! | sum gradients of losses that are differentiated separately | [`GradientSums`](gradients::GradientSums) |
 //! | know which parameters share a learning rate | [`ParameterGroup`](parameters::ParameterGroup) |

@@ -5,6 +5,7 @@ use std::collections::HashMap;
 use burn::module::{Module, Param, ParamId};
 use burn::tensor::Tensor;
 use light4gs_model::attributes::attribute_of_path;
+use light4gs_model::ops::noise_gradient::{NoisyValues, noise_gradient};
 use light4gs_model::parameters::{ParameterVisitor, visit_parameters};
 use light4gs_model::{AttributeEntropy, CodedAttribute, DeformationField, DynamicScene, GaussianPlaces};
 use rand::Rng;
@@ -153,8 +154,9 @@ impl<F: DeformationField, E: EntropyModels> Trainer<F, E> {
         if let Some(term) = steps_term(noisy, &self.state.scene, compression, steps, gradients) {
             gradients.add_module(compression, &mut term.backward());
         }
-        if let Some(attributes) = compression.attributes.as_ref().filter(|_| with_gaussians) {
-            let gradient = gradient_through_noise(noisy, &self.state.scene, attributes, gradients);
+        if let Some(attributes) = compression.attributes.as_ref().filter(|_| with_gaussians)
+            && let Some(gradient) = gradient_through_noise(noisy, &self.state.scene, attributes, gradients)
+        {
             gradients.add_one(attributes.log_steps.id, gradient);
         }
         self.profile.lap("rate");
@@ -169,16 +171,19 @@ fn steps_term<F: DeformationField, C: Module, S: Module>(
     scene: &DynamicScene<F>,
     compression: &Compression<C, S>,
     direct: Vec<Option<Tensor<1>>>,
-    gradients: &GradientSums,
+    gradients: &mut GradientSums,
 ) -> Option<Tensor<1>> {
     if !noisy.learns_steps() {
         return None;
     }
     let steps = compression.planes.as_ref()?.quantization.steps();
-    let planes = scene.planes()?.planes.iter().zip(&noisy.scene.planes()?.planes).zip(direct).enumerate();
-    let terms = planes.map(|(i, ((plane, noisy), direct))| {
+    let planes = &scene.planes()?.planes;
+    let identities: Vec<ParamId> = planes.iter().map(|plane| plane.id).collect();
+    let found = gradients.get(&identities).into_iter().zip(direct);
+    let planes = planes.iter().zip(&noisy.scene.planes()?.planes).zip(found).enumerate();
+    let terms = planes.map(|(i, ((plane, noisy), (gradient, direct)))| {
         let step = steps.of(i);
-        let through_noise = gradients.get(plane.id).map(|gradient| {
+        let through_noise = gradient.map(|gradient| {
             let noise = (noisy.val().inner() - plane.val().inner()).flatten::<1>(0, 2);
             (noise * gradient).sum() / step.clone().inner()
         });
@@ -189,14 +194,14 @@ fn steps_term<F: DeformationField, C: Module, S: Module>(
     terms.reduce(|sum, term| sum + term)
 }
 
-/// The gradient of the logarithms of the attributes' steps through the noise, `[A]`: `Σ noise · gradient of the noisy
-/// values`, since the noise is proportional to the step. `gradients` are those of views and rate.
+/// The gradient of the logarithms of the attributes' steps through the noise, `[A]`. `gradients` are those of views and rate.
+/// `None` if no noisy value has a gradient.
 fn gradient_through_noise<F: DeformationField>(
     noisy: &NoisyScene<F>,
     scene: &DynamicScene<F>,
     attributes: &AttributeEntropy,
-    gradients: &GradientSums,
-) -> Tensor<1> {
+    gradients: &mut GradientSums,
+) -> Option<Tensor<1>> {
     #[derive(Default)]
     struct Values(HashMap<String, (ParamId, Tensor<1>)>);
     impl ParameterVisitor for Values {
@@ -208,13 +213,19 @@ fn gradient_through_noise<F: DeformationField>(
     let (mut exact, mut with_noise) = (Values::default(), Values::default());
     visit_parameters(scene, &mut exact);
     visit_parameters(&noisy.scene, &mut with_noise);
-    let part = |attribute: &CodedAttribute| -> Option<Tensor<1>> {
-        let (id, exact) = exact.0.get(&attribute.name)?;
-        let (_, with_noise) = with_noise.0.get(&attribute.name)?;
-        Some(((with_noise.clone() - exact.clone()) * gradients.get(*id)?).sum())
-    };
-    let none = || Tensor::zeros([1], &scene.gaussians.means.device().inner());
-    Tensor::cat(attributes.attributes().iter().map(|attribute| part(attribute).unwrap_or_else(none)).collect(), 0)
+    let found = attributes.attributes().iter().map(|CodedAttribute { name, .. }| {
+        let (id, exact) = exact.0.remove(name)?;
+        let (_, noisy) = with_noise.0.remove(name)?;
+        Some((id, noisy, exact))
+    });
+    let found: Vec<_> = found.collect();
+    let identities: Vec<ParamId> = found.iter().flatten().map(|(id, ..)| *id).collect();
+    let mut gradients = gradients.get(&identities).into_iter();
+    let values = found.into_iter().map(|values| {
+        let ((_, noisy, exact), gradient) = (values?, gradients.next().flatten());
+        Some(NoisyValues { noisy, exact, gradient: gradient? })
+    });
+    noise_gradient(values.collect())
 }
 
 #[cfg(test)]
@@ -247,8 +258,8 @@ mod tests {
         let mut gradients = GradientSums::default();
         gradients.add_module(&noisy.scene, &mut sum(&noisy.scene).backward());
         let attributes = compression.learned_attributes().unwrap();
-        let found: Vec<f32> =
-            gradient_through_noise(&noisy, &scene, attributes, &gradients).into_data().iter().collect();
+        let found = gradient_through_noise(&noisy, &scene, attributes, &mut gradients).unwrap();
+        let found: Vec<f32> = found.into_data().iter().collect();
 
         let (exact, noise) = (scene.gaussians.tensors().inner(), noisy.scene.gaussians.tensors().inner());
         let wider = |exact: Tensor<2>, noisy: Tensor<2>, change: f64| exact.clone() + (noisy - exact) * change.exp();
@@ -292,7 +303,7 @@ mod tests {
         let direct = noisy.step_gradients(&tape);
         let mut apart = GradientSums::default();
         apart.add_module(&noisy.scene, &mut tape);
-        let term = steps_term(&noisy, &scene, &compression, direct, &apart).unwrap();
+        let term = steps_term(&noisy, &scene, &compression, direct, &mut apart).unwrap();
         apart.add_module(&compression, &mut term.backward());
 
         let steps = quantization.steps();
@@ -305,7 +316,7 @@ mod tests {
         let mut together = GradientSums::default();
         together.add_module(&compression, &mut loss(&planes, &|i| steps.of(i)).backward());
 
-        let [apart, together] = [apart, together].map(|sums| sums.get(log_steps).unwrap().into_data());
+        let [apart, together] = [apart, together].map(|mut sums| sums.get(&[log_steps]).remove(0).unwrap().into_data());
         assert_eq!(together.num_elements(), 2);
         for (a, b) in apart.iter::<f32>().zip(together.iter::<f32>()) {
             assert!((a - b).abs() <= 1e-4 * b.abs().max(1.0), "{a} and {b}");

@@ -13,9 +13,11 @@ use crate::density::{GaussianEditor, TrainingPosition, ViewStatistics};
 use crate::divergence::{NotFinite, not_finite_in};
 use crate::error::TrainError;
 use crate::observers::StepReport;
+use crate::optimization::adam::SteppedModule;
 use crate::optimization::gradients::GradientSums;
 use crate::optimization::parameters::COMPRESSION;
 use crate::regularizer::RegularizerInput;
+use crate::run::Checkpoint;
 use crate::sampling::BatchRequest;
 use crate::stage::Stage;
 
@@ -24,8 +26,8 @@ struct Differentiated {
     views: Vec<View>,
     /// Of the loss with respect to all parameters.
     gradients: GradientSums,
-    /// `[1]`
-    loss: Tensor<1>,
+    /// The terms of the loss, `[1]` each; at least one.
+    loss: Vec<Tensor<1>>,
 }
 
 impl Differentiated {
@@ -35,16 +37,16 @@ impl Differentiated {
     /// # Errors
     /// An operation of the step that failed on the GPU.
     fn read(&self) -> Result<Read, GpuError> {
-        let read = Transaction::default().register(self.loss.clone());
+        let read = self.loss.iter().fold(Transaction::default(), |read, term| read.register(term.clone()));
         let read = self.views.iter().fold(read, |read, view| read.register(view.intersections.clone()));
         let corrections = self.views.iter().flat_map(|view| view.corrections.clone());
         let read = corrections.fold(read, |read, gradient| read.register(gradient));
         let read = GpuError::read("a training step", read)?;
-        let (loss, views) = read.split_first().expect("the loss was registered");
+        let (loss, views) = read.split_at(self.loss.len());
         let (intersections, corrections) = views.split_at(self.views.len());
         let intersections = intersections.iter().flat_map(|data| data.iter::<i64>()).map(|count| count as usize);
         Ok(Read {
-            loss: loss.iter::<f32>().next().expect("a loss is one number"),
+            loss: loss.iter().flat_map(|term| term.iter::<f32>()).sum(),
             intersections: intersections.collect(),
             corrections: corrections.iter().map(|data| data.iter::<f32>().collect()).collect(),
         })
@@ -98,12 +100,14 @@ impl<F: DeformationField, E: EntropyModels> Trainer<F, E> {
         let rates = GroupRates::new(&self.config, attributes, stage, iteration, self.data.extent);
         let field_rates = self.field_rates(&rates);
         let rate = |group, path: &str| field_rates.get(path).copied().or_else(|| rates.of(group, path));
-        self.state.adam.step_module("", &mut self.state.scene, &mut gradients, rate);
-        if let Some(compression) = &mut self.state.compression {
-            self.state.adam.step_module(COMPRESSION, compression, &mut gradients, rate);
-            if noisy.is_some_and(|noisy| noisy.learns_steps()) {
-                compression.bound_steps(&self.config);
-            }
+        let Checkpoint { scene, compression, adam, .. } = &mut self.state;
+        let mut modules: Vec<(&str, &mut dyn SteppedModule)> = vec![("", scene)];
+        modules.extend(compression.as_mut().map(|compression| (COMPRESSION, compression as _)));
+        adam.step_modules(&mut modules, &mut gradients, rate);
+        if let Some(compression) = compression
+            && noisy.is_some_and(|noisy| noisy.learns_steps())
+        {
+            compression.bound_steps(&self.config);
         }
         self.learn_corrections(stage, iteration, &indices, &corrections);
         self.profile.lap("Adam");
@@ -137,8 +141,7 @@ impl<F: DeformationField, E: EntropyModels> Trainer<F, E> {
         let own = self.add_field_regularizer(stage, iteration, &mut gradients);
         let others = self.add_regularizers(stage, iteration, &mut gradients);
         let regularizers = regularizer.into_iter().chain(own).chain(others);
-        let terms = views.iter().map(|view| view.loss.clone()).chain(rate).chain(regularizers);
-        let loss = terms.reduce(|sum, term| sum + term).expect("a batch has at least one view");
+        let loss = views.iter().map(|view| view.loss.clone()).chain(rate).chain(regularizers).collect();
         Ok(Differentiated { views, gradients, loss })
     }
 
@@ -298,8 +301,8 @@ mod tests {
         let [first, second] = [(), ()].map(|()| trainer.differentiate(Stage::Fine, 3, &[0, 1], Some(&noisy)).unwrap());
         assert_eq!(first.read(), second.read());
         let id = noisy.scene.planes().unwrap().planes[0].id;
-        let gradient = |step: &Differentiated| step.gradients.get(id).unwrap().into_data();
-        assert_eq!(gradient(&first), gradient(&second));
+        let gradient = |step: Differentiated| { step }.gradients.get(&[id]).remove(0).unwrap().into_data();
+        assert_eq!(gradient(first), gradient(second));
     }
 
     #[cfg(feature = "wgpu")]

@@ -189,7 +189,8 @@ impl ViewPass<'_> {
             stage: self.stage,
             iteration: self.iteration,
         });
-        let loss = loss * (1.0 / self.batch as f32);
+        // The loss of a step is the mean over its views. One view needs no launch for it.
+        let loss = if self.batch > 1 { loss * (1.0 / self.batch as f32) } else { loss };
         profile.lap("loss");
         let value = loss.clone().inner();
         let mut tape = loss.backward();
@@ -202,7 +203,10 @@ impl ViewPass<'_> {
             corrections: learned.and_then(|learned| learned.gradient(&mut tape)),
             // The loss is a mean over the batch; thresholds are those for a single view.
             statistics: ViewStatistics {
-                screen_gradient: offsets.grad_remove(&mut tape).map(|gradient| gradient * self.batch as f32),
+                screen_gradient: offsets.grad_remove(&mut tape).map(|gradient| match self.batch {
+                    0 | 1 => gradient,
+                    batch => gradient * batch as f32,
+                }),
                 radii: if factor == 1 { rendering.radii } else { rendering.radii * i64::from(factor) },
             },
             image: image.inner(),

@@ -5,7 +5,7 @@ use burn::tensor::{Device, Tensor, Transaction};
 use light4gs_model::ops::activation::{bounded_exponential, sigmoid};
 use light4gs_model::ops::lower_bound::lower_bound;
 use light4gs_model::ops::normal_cdf::normal_cdf;
-use light4gs_model::ops::uniform_noise::add_uniform_noise;
+use light4gs_model::ops::uniform_noise::{NoiseDraw, add_uniform_noise};
 use light4gs_model::{GpuError, HexPlaneConfig, PixelContribution, PlaneTensors, Significance, Splatter};
 use light4gs_tests::odd_scenes::dots;
 
@@ -106,9 +106,10 @@ fn a_crowded_cell() {
 #[test]
 fn noise_is_that_of_the_cpu() {
     let run = |device: Device| -> Vec<f32> {
-        let widths = Tensor::from_floats([0.25, 0.5], &device);
-        let noisy = add_uniform_noise(Tensor::<1>::zeros([70_000], &device), widths, 1, 1 << 40 | 3);
-        noisy.into_data().iter().collect()
+        let (widths, unit) = (Tensor::from_floats([0.25, 0.125], &device), Tensor::from_floats([4.0], &device));
+        let draw = NoiseDraw { width: 1, in_units: true, seed: 1 << 40 | 3 };
+        let noisy = add_uniform_noise(vec![Tensor::<1>::zeros([70_000], &device)], widths, unit, vec![draw]);
+        noisy[0].clone().into_data().iter().collect()
     };
     assert_eq!(run(Device::wgpu(Default::default())), run(Device::flex()));
 }

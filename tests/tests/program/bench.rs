@@ -66,12 +66,12 @@ fn a_step_does_not_launch_more_kernels_than_before() {
     for (part, bound) in [
         ("splat forward + backward", 28),
         ("skinning forward + backward", 11),
-        ("nodes, training step", 51),
-        ("nodes, step with noise", 103),
-        ("nodes, step with noise and rate", 196),
+        ("nodes, training step", 45),
+        ("nodes, step with noise", 51),
+        ("nodes, step with noise and rate", 123),
         ("nodes, render", 20),
-        ("hexplane, training step", 148),
-        ("hexplane, step with noise and rate", 1208),
+        ("hexplane, training step", 124),
+        ("hexplane, step with noise and rate", 1186),
     ] {
         let found = launches(part);
         assert!((1..=bound + more).contains(&found), "{part}: {found} launches, {bound} before; {adapter}");

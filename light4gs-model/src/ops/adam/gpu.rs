@@ -8,9 +8,9 @@ use cubecl::server::Handle;
 use light4gs_shaders::ADAM;
 
 use super::{AdamOps, AdamStep, AdamTensors, SteppedParameter, adam_steps};
-use crate::gpu::{Arena, Gpu, Kernel, Launch, PLACE_ALIGNMENT, buffer_of};
+use crate::gpu::{Arena, Gpu, Kernel, Launch, batches, buffer_of};
 use crate::gpu_error::GpuError;
-use crate::ops::fusion::{leaf, resolve};
+use crate::ops::fusion::{leaves, resolve_all};
 use crate::ops::sample::{GpuOperation, Numbers};
 use crate::ops::tensor_list::TensorList;
 
@@ -43,21 +43,13 @@ fn steps_of(
     let AdamTensors { parameters, first_moments, second_moments } = tensors;
     let Some(any) = parameters.0.first() else { return Ok(Vec::new()) };
     let gpu = Gpu::of(any)?;
+    let lengths: Vec<usize> = gradients.iter().map(|gradient| gradient.shape().num_elements()).collect();
     let moments = first_moments.0.into_iter().zip(second_moments.0);
     let stepped = parameters.0.into_iter().zip(moments).map(|(parameter, (first, second))| [parameter, first, second]);
-    let mut rest =
-        stepped.zip(gradients).zip(steps).map(|((stepped, gradient), step)| (stepped, gradient, step)).peekable();
-    let mut done = Vec::new();
-    while rest.peek().is_some() {
-        // As many as a table and a buffer hold, but at least one.
-        let (mut batch, mut total): (Vec<Stepping>, usize) = (Vec::new(), 0);
-        while let Some(next) = rest.next_if(|next| {
-            total += next.1.shape().num_elements().next_multiple_of(PLACE_ALIGNMENT);
-            batch.is_empty() || (batch.len() < MOST_TENSORS && gpu.holds(total))
-        }) {
-            batch.push(next);
-        }
-        done.extend(step_at_once(&gpu, batch)?);
+    let mut rest = stepped.zip(gradients).zip(steps).map(|((stepped, gradient), step)| (stepped, gradient, step));
+    let mut done = Vec::with_capacity(lengths.len());
+    for batch in batches(&gpu, &lengths, MOST_TENSORS) {
+        done.extend(step_at_once(&gpu, rest.by_ref().take(batch.len()).collect())?);
     }
     Ok(done)
 }
@@ -117,14 +109,12 @@ impl AdamOps for CubeBackend {
 
 impl<B: FusionBackend + AdamOps> AdamOps for Fusion<B> {
     fn adam(tensors: AdamTensors<Self>, gradients: TensorList<Self>, steps: Vec<AdamStep>) -> AdamTensors<Self> {
-        let resolved = |list: TensorList<Self>| TensorList(list.0.into_iter().map(resolve::<B>).collect());
         let tensors = AdamTensors {
-            parameters: resolved(tensors.parameters),
-            first_moments: resolved(tensors.first_moments),
-            second_moments: resolved(tensors.second_moments),
+            parameters: resolve_all(tensors.parameters),
+            first_moments: resolve_all(tensors.first_moments),
+            second_moments: resolve_all(tensors.second_moments),
         };
-        let stepped = B::adam(tensors, resolved(gradients), steps);
-        let leaves = |list: TensorList<B>| TensorList(list.0.into_iter().map(leaf::<B>).collect());
+        let stepped = B::adam(tensors, resolve_all(gradients), steps);
         AdamTensors {
             parameters: leaves(stepped.parameters),
             first_moments: leaves(stepped.first_moments),

@@ -1,4 +1,4 @@
-//! Rows of a table and their neighbors, and the derivative.
+//! Rows of tables and their neighbors, and the derivative.
 
 use burn::backend::TensorMetadata;
 use burn::backend::tensor::FloatTensor;
@@ -8,6 +8,7 @@ use rayon::prelude::*;
 use super::{Chosen, Neighborhoods, NeighborhoodsKernels};
 use crate::ops::for_cpu_back_ends;
 use crate::ops::host::HostBackend;
+use crate::ops::tensor_list::TensorList;
 
 /// Rows of the table that a parallel task of the backward pass adds up.
 const CHUNK: usize = 256;
@@ -59,26 +60,42 @@ fn backward(gradient: &[f32], columns: usize, chosen: &Chosen) -> Vec<f32> {
     sums
 }
 
-fn forward_on_cpu<B: HostBackend>(table: FloatTensor<B>, chosen: &Neighborhoods) -> FloatTensor<B> {
+fn forward_on_cpu<B: HostBackend>(tables: TensorList<B>, chosen: &Neighborhoods) -> FloatTensor<B> {
+    let table = B::float_cat(tables.0, 1);
     let columns = table.shape()[1];
     let result = forward(B::to_host(table).as_slice(), columns, &chosen.0);
     B::from_values(result, [3 * columns, chosen.0.len()])
 }
 
-fn backward_on_cpu<B: HostBackend>(chosen: &Neighborhoods, gradient: FloatTensor<B>) -> FloatTensor<B> {
+fn backward_on_cpu<B: HostBackend>(
+    chosen: &Neighborhoods,
+    widths: &[usize],
+    gradient: FloatTensor<B>,
+) -> TensorList<B> {
     let columns = gradient.shape()[0] / 3;
     let sums = backward(B::to_host(gradient).as_slice(), columns, &chosen.0);
-    B::from_values(sums, [chosen.0.count, columns])
+    let mut first = 0;
+    let table = |width: &usize| {
+        let own = first..first + width;
+        first += width;
+        let numbers = sums.chunks_exact(columns).flat_map(|row| &row[own.clone()]).copied().collect();
+        B::from_values(numbers, [chosen.0.count, *width])
+    };
+    TensorList(widths.iter().map(table).collect())
 }
 
 for_cpu_back_ends! {
     NeighborhoodsKernels {
-        fn neighborhoods_forward(table: FloatTensor<Self>, chosen: &Neighborhoods) -> FloatTensor<Self> {
-            forward_on_cpu::<Self>(table, chosen)
+        fn neighborhoods_forward(tables: TensorList<Self>, chosen: &Neighborhoods) -> FloatTensor<Self> {
+            forward_on_cpu::<Self>(tables, chosen)
         }
 
-        fn neighborhoods_backward(chosen: &Neighborhoods, gradient: FloatTensor<Self>) -> FloatTensor<Self> {
-            backward_on_cpu::<Self>(chosen, gradient)
+        fn neighborhoods_backward(
+            chosen: &Neighborhoods,
+            widths: &[usize],
+            gradient: FloatTensor<Self>,
+        ) -> TensorList<Self> {
+            backward_on_cpu::<Self>(chosen, widths, gradient)
         }
     }
 }

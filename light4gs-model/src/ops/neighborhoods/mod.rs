@@ -1,8 +1,8 @@
-//! Rows of a table and their neighbors, as a Burn operation: attributes of Gaussians are predicted from these numbers.
+//! Rows of tables and their neighbors, as a Burn operation: attributes of Gaussians are predicted from these numbers.
 //!
 //! Burn has `select`, `mean_dim` and `cat`. On a GPU, the backward pass of `select` adds the chosen rows one after the other, one
 //! invocation a column: thousands of steps that wait for each other; and joining and narrowing tensors are launches of their
-//! own, two and more each. Here the host, which knows the rows, tells where each row was chosen, and every number of the table
+//! own, two and more each. Here the host, which knows the rows, tells where each row was chosen, and every number of a table
 //! adds up its own few, in one launch.
 
 mod cpu;
@@ -15,11 +15,15 @@ use std::sync::{Arc, OnceLock};
 
 use burn::backend::autodiff::checkpoint::strategy::CheckpointStrategy;
 use burn::backend::tensor::FloatTensor;
-use burn::backend::{Autodiff, Backend, Dispatch, backend_extension};
-use burn::tensor::Tensor;
+use burn::backend::{Autodiff, Backend, Dispatch, TensorMetadata, backend_extension};
+use burn::tensor::{FloatDType, Tensor};
 use light4gs_codec::attributes::NEIGHBORS;
 
+use super::tensor_list::TensorList;
 use super::{for_all_back_ends, recorded};
+
+/// Most tables of a call.
+pub const MOST_TABLES: usize = 16;
 
 /// Some rows of a table, in any order, and the [`NEIGHBORS`] neighbors of each, the nearest first. Cloning shares them.
 #[derive(Clone, Debug)]
@@ -91,12 +95,16 @@ impl Chosen {
 /// A back end's kernels. [`NeighborhoodsOps`] adds the dispatch and the
 /// tape.
 pub trait NeighborhoodsKernels: Backend {
-    /// `[3 C, M]` of `table [N, C]`: a column for each chosen row, with its own numbers, the means over its neighbors and
-    /// the numbers of the nearest one.
-    fn neighborhoods_forward(table: FloatTensor<Self>, chosen: &Neighborhoods) -> FloatTensor<Self>;
+    /// `[3 C, M]` of tables with N rows and C columns together: a column for each chosen row, with its own numbers, the means over
+    /// its neighbors and the numbers of the nearest one.
+    fn neighborhoods_forward(tables: TensorList<Self>, chosen: &Neighborhoods) -> FloatTensor<Self>;
 
-    /// The gradient of the table `[N, C]` from that of the result `[3 C, M]`.
-    fn neighborhoods_backward(chosen: &Neighborhoods, gradient: FloatTensor<Self>) -> FloatTensor<Self>;
+    /// The gradients of the tables, which have these numbers of columns, from that of the result `[3 C, M]`.
+    fn neighborhoods_backward(
+        chosen: &Neighborhoods,
+        widths: &[usize],
+        gradient: FloatTensor<Self>,
+    ) -> TensorList<Self>;
 }
 
 /// The operation on every back end that has [`NeighborhoodsKernels`], differentiable under [`Autodiff`].
@@ -104,30 +112,45 @@ pub trait NeighborhoodsKernels: Backend {
     NdArray: cfg(feature = "ndarray"), Flex: cfg(feature = "flex"), Cube: cfg(feature = "wgpu"), Autodiff
 )]
 pub trait NeighborhoodsOps: Backend {
-    /// `[3 C, M]`; see [`neighborhoods`].
-    fn neighborhoods(table: FloatTensor<Self>, chosen: Neighborhoods) -> FloatTensor<Self>;
+    /// `[3 C, M]` of [`MOST_TABLES`] tables, some of them without columns; see [`neighborhoods`].
+    fn neighborhoods(#[extension_type] tables: TensorList<Self>, chosen: Neighborhoods) -> FloatTensor<Self>;
 }
 
 for_all_back_ends! {
     NeighborhoodsOps with NeighborhoodsKernels {
-        fn neighborhoods(table: FloatTensor<Self>, chosen: Neighborhoods) -> FloatTensor<Self> {
-            Self::neighborhoods_forward(table, &chosen)
+        fn neighborhoods(tables: TensorList<Self>, chosen: Neighborhoods) -> FloatTensor<Self> {
+            Self::neighborhoods_forward(with_columns(tables), &chosen)
         }
     }
 }
 
+/// The tables that have columns.
+fn with_columns<B: Backend>(tables: TensorList<B>) -> TensorList<B> {
+    TensorList(tables.0.into_iter().filter(|table| table.shape()[1] > 0).collect())
+}
+
 impl<B: NeighborhoodsOps + NeighborhoodsKernels, C: CheckpointStrategy> NeighborhoodsOps for Autodiff<B, C> {
-    fn neighborhoods(table: FloatTensor<Self>, chosen: Neighborhoods) -> FloatTensor<Self> {
-        let node = table.node();
-        let result = B::neighborhoods_forward(table.into_primitive(), &chosen);
-        recorded::<B, C, _, _>([node], (result, chosen), |chosen, gradient| {
-            [B::neighborhoods_backward(&chosen, gradient)]
+    fn neighborhoods(tables: TensorList<Self>, chosen: Neighborhoods) -> FloatTensor<Self> {
+        let tables: [FloatTensor<Self>; MOST_TABLES] =
+            tables.0.try_into().unwrap_or_else(|tables: Vec<_>| panic!("{} tables", tables.len()));
+        let nodes = tables.each_ref().map(|table| table.node());
+        let tables = tables.map(|table| table.into_primitive());
+        let shapes = tables.each_ref().map(|table| table.shape());
+        let result = B::neighborhoods_forward(with_columns(TensorList(tables.into())), &chosen);
+        recorded::<B, C, _, _>(nodes, (result, (chosen, shapes)), |(chosen, shapes), gradient| {
+            let device = gradient.device();
+            let widths: Vec<usize> = shapes.iter().map(|shape| shape[1]).filter(|width| *width > 0).collect();
+            let mut gradients = B::neighborhoods_backward(&chosen, &widths, gradient).0.into_iter();
+            shapes.map(|shape| match shape[1] {
+                0 => B::float_zeros(shape, &device, FloatDType::F32),
+                _ => gradients.next().expect("a gradient for each table"),
+            })
         })
     }
 }
 
-/// Some rows of a table `[N, C]` and their neighbors, each as a column of the result `[3 C, M]`: the numbers of the row, the
-/// means over its neighbors, the numbers of the nearest one.
+/// Some rows of tables, which have N rows and C columns together, and their neighbors, each as a column of the result `[3 C, M]`:
+/// the numbers of the row, the means over its neighbors, the numbers of the nearest one.
 ///
 /// ```
 /// use burn::tensor::{Device, Tensor};
@@ -135,7 +158,8 @@ impl<B: NeighborhoodsOps + NeighborhoodsKernels, C: CheckpointStrategy> Neighbor
 ///
 /// let device = Device::flex().autodiff();
 /// let table = Tensor::<2>::from_floats([[1.0], [2.0], [4.0]], &device).require_grad();
-/// let columns = neighborhoods(table.clone(), Neighborhoods::new(&[0, 2], &[[1, 2, 2, 2], [1, 0, 0, 0]], 3));
+/// let chosen = Neighborhoods::new(&[0, 2], &[[1, 2, 2, 2], [1, 0, 0, 0]], 3);
+/// let columns = neighborhoods(vec![table.clone()], chosen);
 /// assert_eq!(columns.clone().into_data().to_vec::<f32>().unwrap(), [1.0, 4.0, 3.5, 1.25, 2.0, 2.0]);
 /// // The first row counts for itself, and for three of the four neighbors of the last.
 /// let gradient = table.grad(&columns.sum().backward()).unwrap();
@@ -143,10 +167,16 @@ impl<B: NeighborhoodsOps + NeighborhoodsKernels, C: CheckpointStrategy> Neighbor
 /// ```
 ///
 /// # Panics
-/// If the rows are of a table with another number of rows.
-pub fn neighborhoods(table: Tensor<2>, chosen: Neighborhoods) -> Tensor<2> {
-    assert_eq!(table.dims()[0], chosen.0.count, "the rows were chosen for another table");
-    Tensor::from_dispatch(Dispatch::neighborhoods(table.into_dispatch(), chosen))
+/// If there is no table with a column, or there are more than [`MOST_TABLES`]; if the rows are of tables with another number of rows.
+pub fn neighborhoods(tables: Vec<Tensor<2>>, chosen: Neighborhoods) -> Tensor<2> {
+    let (count, device) = (tables.len(), tables.first().expect("a table or more").device());
+    assert!(count <= MOST_TABLES, "{count} tables, and {MOST_TABLES} at most");
+    let rows = |table: &Tensor<2>| table.dims()[0];
+    assert!(tables.iter().all(|table| rows(table) == chosen.0.count), "the rows were chosen for other tables");
+    // The tape takes a fixed number of them.
+    let nothing = std::iter::repeat_with(|| Tensor::empty([chosen.0.count, 0], &device));
+    let tables = tables.into_iter().chain(nothing.take(MOST_TABLES - count)).map(Tensor::into_dispatch).collect();
+    Tensor::from_dispatch(Dispatch::neighborhoods(TensorList(tables), chosen.clone()))
 }
 
 #[cfg(test)]

@@ -12,7 +12,7 @@ use light4gs_shaders::{PLANE_GATHER, PLANE_PACK, PLANE_QUERY, PLANE_QUERY_BACKWA
 
 use super::{PLANES, PlaneQueryGradients, PlaneQueryInputs, PlaneQueryKernels, PlaneSet};
 use crate::gpu::sort::{bits_for, ranges, sort};
-use crate::gpu::{Gpu, Kernel, Launch, Places, buffer_of, first_words};
+use crate::gpu::{Arena, Gpu, Kernel, Launch, Places, buffer_of, first_words};
 use crate::gpu_error::GpuError;
 use crate::ops::fusion::{leaf, resolve};
 use crate::ops::sample::GpuOperation;
@@ -101,14 +101,19 @@ fn forward(inputs: PlaneQueryInputs<CubeBackend>, set: PlaneSet) -> Result<(Cube
     let layout = Layout { points: points.shape()[0], channels, planes: shapes };
     let points = buffer_of(points);
     let packed = gpu.allocate("packed planes", 4 * layout.quads() * layout.cells())?;
-    for (k, (_, plane)) in planes.into_iter().enumerate() {
-        let sizes = [layout.cells_of(k), layout.channels, layout.quads(), layout.first_cell(k)];
-        Launch::new(&gpu.client, PLANE_PACK)
-            .reads(&buffer_of(plane))
-            .writes(&packed)
-            .uniform(&sizes.map(|size| size as u32))
-            .invocations(layout.cells_of(k))?;
+    let lengths: Vec<usize> = layout.planes.iter().map(|(_, shape)| shape.num_elements()).collect();
+    let planes: Vec<Handle> = planes.into_iter().map(|(_, plane)| buffer_of(plane)).collect();
+    let planes = Arena::of(&gpu, "planes", &planes, &lengths)?;
+    let mut rows = [[0; 4]; PLANES];
+    for (k, start) in planes.places.starts.iter().enumerate() {
+        rows[k] = [*start, layout.cells_of(k), layout.first_cell(k), 0].map(|number| number as u32);
     }
+    let sizes = [layout.cells(), layout.channels, layout.quads(), 0].map(|size| size as u32);
+    Launch::new(&gpu.client, PLANE_PACK)
+        .reads(&planes.buffer)
+        .writes(&packed)
+        .uniform(&[&sizes, rows.as_flattened()].concat())
+        .invocations(layout.cells())?;
     let features = gpu.allocate("features", layout.points * layout.channels)?;
     launch(&gpu.client, PLANE_QUERY, &layout)
         .reads(&points)

@@ -4,9 +4,10 @@ use burn::backend::TensorMetadata;
 use burn::backend::tensor::FloatTensor;
 use rayon::prelude::*;
 
-use super::UniformNoiseOps;
+use super::{NoiseDraw, UniformNoiseOps};
 use crate::ops::for_cpu_back_ends;
 use crate::ops::host::HostBackend;
+use crate::ops::tensor_list::TensorList;
 
 const CHUNK: usize = 1 << 14;
 
@@ -17,21 +18,22 @@ fn mixed(mut x: u32) -> u32 {
     x ^ (x >> 16)
 }
 
+/// The two words of a seed.
+pub(super) fn words(seed: u64) -> [u32; 2] {
+    [seed as u32, (seed >> 32) as u32]
+}
+
 /// In [-1/2, 1/2): a multiple of 2^-24. `shaders/uniform_noise/uniform_noise.wgsl` computes the same.
 fn noise(place: u32, seed: [u32; 2]) -> f32 {
     let bits = mixed(mixed(place.wrapping_add(seed[0])) ^ seed[1]);
     (bits >> 8) as f32 * (1.0 / 16_777_216.0) - 0.5
 }
 
-fn noise_on_cpu<B: HostBackend>(
-    values: FloatTensor<B>,
-    widths: FloatTensor<B>,
-    which: usize,
-    seed: [u32; 2],
-) -> FloatTensor<B> {
+fn noise_on_cpu<B: HostBackend>(values: FloatTensor<B>, width: f32, seed: u64) -> FloatTensor<B> {
+    let seed = words(seed);
     let shape = values.shape();
-    let (values, widths) = (B::to_host(values), B::to_host(widths));
-    let (values, width) = (values.as_slice(), widths.as_slice()[which]);
+    let values = B::to_host(values);
+    let values = values.as_slice();
     let mut noisy = vec![0.0; values.len()];
     noisy.par_chunks_mut(CHUNK).zip(values.par_chunks(CHUNK)).enumerate().for_each(|(chunk, (noisy, values))| {
         for (i, (noisy, value)) in noisy.iter_mut().zip(values).enumerate() {
@@ -44,12 +46,18 @@ fn noise_on_cpu<B: HostBackend>(
 for_cpu_back_ends! {
     UniformNoiseOps {
         fn uniform_noise(
-            values: FloatTensor<Self>,
+            values: TensorList<Self>,
             widths: FloatTensor<Self>,
-            which: usize,
-            seed: [u32; 2],
-        ) -> FloatTensor<Self> {
-            noise_on_cpu::<Self>(values, widths, which, seed)
+            unit: FloatTensor<Self>,
+            draws: Vec<NoiseDraw>,
+        ) -> TensorList<Self> {
+            let (widths, unit) = (Self::to_host(widths), Self::to_host(unit));
+            let width = |draw: NoiseDraw| {
+                let width = widths.as_slice()[draw.width];
+                if draw.in_units { width * unit.as_slice()[0] } else { width }
+            };
+            let noisy = values.0.into_iter().zip(draws);
+            TensorList(noisy.map(|(values, draw)| noise_on_cpu::<Self>(values, width(draw), draw.seed)).collect())
         }
     }
 }
