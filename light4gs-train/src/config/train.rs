@@ -1,7 +1,7 @@
 //! `[train]`: how it is trained.
 
 use light4gs_data::Camera;
-use light4gs_keys::Bounds::{self, Whole};
+use light4gs_keys::Bounds::{self, Number, Whole};
 use light4gs_keys::{ByName, INTERVAL, ITERATION, ITERATIONS, RATE, SHARE, keys, optional};
 use light4gs_model::regularizer::PlaneRegularizer;
 
@@ -135,6 +135,19 @@ keys! {
         /// Length of the decay in iterations. 0: the length of the stage.
         #[serde(with = "optional")]
         schedule_steps: Option<usize> = None; ITERATION, "ours; reference: 20000";
+        /// Share of the fine stage, at its end, in which these rates fall once more, so that the noise of the steps is averaged
+        /// away once motion has been found. 0: none.
+        cooldown: f64 = 0.0; SHARE, "ours; the last phase of warmup-stable-decay (Hu et al. 2024)";
+        /// Factor by which they have fallen at its end.
+        cooldown_factor: f64 = 0.1; Number { least: 1e-6, most: 1.0 }, "ours";
+    }
+}
+
+impl LearningRates {
+    /// The factor of the rates when this share of the fine stage is over.
+    pub fn cooled(&self, progress: f64) -> f64 {
+        let begin = 1.0 - self.cooldown;
+        if progress <= begin { 1.0 } else { self.cooldown_factor.powf((progress - begin) / self.cooldown) }
     }
 }
 
@@ -143,6 +156,14 @@ mod tests {
     use glam::Vec3;
 
     use super::*;
+
+    #[test]
+    fn rates_cool_down_at_the_end() {
+        let rates = LearningRates { cooldown: 0.5, cooldown_factor: 0.01, ..LearningRates::default() };
+        let found = [0.0, 0.5, 0.75, 1.0].map(|progress| rates.cooled(progress));
+        assert_eq!(found.map(|factor| (factor * 1e6).round() / 1e6), [1.0, 1.0, 0.1, 0.01]);
+        assert_eq!(LearningRates::default().cooled(1.0), 1.0);
+    }
 
     #[test]
     fn images_grow_from_coarse_to_fine() {

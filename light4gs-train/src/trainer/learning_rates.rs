@@ -21,6 +21,8 @@ pub(super) struct GroupRates {
     steps: f64,
     /// Iterations over which the rates decay.
     steps_of_schedule: usize,
+    /// What the cooldown has left of the rates of scene and field.
+    cooled: f64,
     iteration: usize,
 }
 
@@ -38,6 +40,7 @@ impl GroupRates {
         let rates = &train.learning_rate;
         let steps = rates.schedule_steps.unwrap_or(train.iterations(stage));
         let scale = f64::from(extent);
+        let cooled = rates.cooled(train.progress(stage, iteration));
         let decay =
             |first: f64, last: f64| ExponentialDecay::new(first * scale, last * scale, steps).at(iteration as f64);
         let attribute = |attribute: &Attribute| {
@@ -46,18 +49,19 @@ impl GroupRates {
                 true => decay(initial, last),
                 false => ExponentialDecay::new(initial, last, steps).at(iteration as f64),
             };
-            (attribute.path(), rate)
+            (attribute.path(), rate * cooled)
         };
         let model =
             |first: f64, last: f64| ExponentialDecay::new(first, last, train.fine_iterations).at(iteration as f64);
         Self {
             attributes: attributes.map(attribute).collect(),
-            planes: decay(rates.planes_init, rates.planes_final),
+            planes: decay(rates.planes_init, rates.planes_final) * cooled,
             deformation: LearningRate {
                 initial: rates.deformation_init * scale,
                 last: rates.deformation_final * scale,
             },
             steps_of_schedule: steps,
+            cooled,
             iteration,
             context: model(compression.context.learning_rate_init, compression.context.learning_rate_final),
             sh_model: model(compression.sh.learning_rate_init, compression.sh.learning_rate_final),
@@ -75,7 +79,7 @@ impl GroupRates {
         if initial == 0.0 || last == 0.0 {
             return 0.0;
         }
-        ExponentialDecay::new(initial, last, self.steps_of_schedule).at(self.iteration as f64)
+        ExponentialDecay::new(initial, last, self.steps_of_schedule).at(self.iteration as f64) * self.cooled
     }
 
     /// The rate of a parameter in a group; `None` for an attribute without a known rate.
