@@ -59,7 +59,8 @@ pub(super) struct Encode {
     /// whole file has arrived.
     #[arg(long, value_name = "NUMBER")]
     layers: Option<usize>,
-    /// Back end: auto (a graphics card if there is one), ndarray, flex, wgpu, or wgpu with an adapter such as wgpu:0.
+    /// Back end: auto (a graphics card if there is one), flex or ndarray (both on the processor), wgpu, or wgpu with an adapter
+    /// such as wgpu:0.
     #[arg(long)]
     device: Option<DeviceName>,
     /// Print the result as JSON.

@@ -60,7 +60,8 @@ pub(super) struct Render {
     /// Frames a second of a GIF or an MP4.
     #[arg(long, default_value_t = 20.0, allow_negative_numbers = true)]
     fps: f32,
-    /// Back end: auto (a graphics card if there is one), ndarray, flex, wgpu, or wgpu with an adapter such as wgpu:0.
+    /// Back end: auto (a graphics card if there is one), flex or ndarray (both on the processor), wgpu, or wgpu with an adapter
+    /// such as wgpu:0.
     #[arg(long, default_value_t)]
     device: DeviceName,
     #[command(flatten)]

@@ -65,7 +65,8 @@ pub(super) struct Train {
     /// Changes one key of the configuration; may be given more than once.
     #[arg(long = "set", value_name = "KEY=VALUE")]
     overrides: Vec<String>,
-    /// Back end: auto (a graphics card if there is one), ndarray, flex, wgpu, or wgpu with an adapter such as wgpu:0.
+    /// Back end: auto (a graphics card if there is one), flex or ndarray (both on the processor), wgpu, or wgpu with an adapter
+    /// such as wgpu:0.
     #[arg(long)]
     device: Option<DeviceName>,
     #[command(flatten)]
@@ -323,7 +324,8 @@ pub(super) struct Eval {
     /// Folder of the dataset, if it is not the run's own.
     #[arg(long)]
     scene: Option<PathBuf>,
-    /// Back end: auto (a graphics card if there is one), ndarray, flex, wgpu, or wgpu with an adapter such as wgpu:0.
+    /// Back end: auto (a graphics card if there is one), flex or ndarray (both on the processor), wgpu, or wgpu with an adapter
+    /// such as wgpu:0.
     #[arg(long)]
     device: Option<DeviceName>,
     /// Weights of LPIPS (see docs/metrics.md), in place of the configuration's `eval.lpips`; may be given more than once.

@@ -83,7 +83,7 @@ pub(super) struct Export {
     /// Number of frames over time 0 to 1, keyframes in a .glb; by default as many as the file was made from.
     #[arg(long, value_parser = clap::value_parser!(u32).range(1..=i64::from(MOST_FRAMES)), allow_negative_numbers = true)]
     frames: Option<u32>,
-    /// A single time, in [0, 1], for a .ply or .glb file; by default 0 if the file needs one.
+    /// A single time, in [0, 1], for a .ply or .glb file. An output that can hold only one time gets time 0 by default.
     #[arg(long, allow_negative_numbers = true, conflicts_with_all = ["frames", "fps"])]
     time: Option<f32>,
     /// Frames a second of a .4dgs, of a .glb with motion, and of the PLY files of a take; by default those of the source, or
@@ -93,7 +93,8 @@ pub(super) struct Export {
     /// For a .glb: the scene's z axis points up, as in Blender. The file is turned, since glTF's y axis points up.
     #[arg(long)]
     z_up: bool,
-    /// Back end: auto (a graphics card if there is one), ndarray, flex, wgpu, or wgpu with an adapter such as wgpu:0.
+    /// Back end: auto (a graphics card if there is one), flex or ndarray (both on the processor), wgpu, or wgpu with an adapter
+    /// such as wgpu:0.
     #[arg(long, default_value_t)]
     device: DeviceName,
     #[command(flatten)]

@@ -60,7 +60,8 @@ pub(super) struct Study {
     /// Changes one key of every variant's configuration; may be given more than once.
     #[arg(long = "set", value_name = "KEY=VALUE")]
     overrides: Vec<String>,
-    /// Back end: auto (a graphics card if there is one), ndarray, flex, wgpu, or wgpu with an adapter such as wgpu:0.
+    /// Back end: auto (a graphics card if there is one), flex or ndarray (both on the processor), wgpu, or wgpu with an adapter
+    /// such as wgpu:0.
     #[arg(long)]
     device: Option<DeviceName>,
     /// Runs of each variant on each scene, with different seeds. Tables then show means and standard deviations.
