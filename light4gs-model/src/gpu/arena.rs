@@ -84,15 +84,17 @@ impl Arena {
 
 /// Tensors of these lengths in batches, each of as many as one buffer holds and no more than `most`, but of one at least.
 pub(crate) fn batches(gpu: &Gpu, lengths: &[usize], most: usize) -> Vec<Range<usize>> {
-    let mut batches = Vec::new();
-    let mut first = 0;
-    while first < lengths.len() {
-        let mut end = first + 1;
-        while end < lengths.len() && end - first < most && gpu.holds(Places::new(&lengths[first..=end]).total) {
-            end += 1;
+    let (mut batches, mut first, mut total): (Vec<Range<usize>>, usize, usize) = (Vec::new(), 0, 0);
+    for (tensor, length) in lengths.iter().enumerate() {
+        let room = Places::room_of(*length);
+        if tensor > first && (tensor - first == most || !gpu.holds(total + room)) {
+            batches.push(first..tensor);
+            (first, total) = (tensor, 0);
         }
-        batches.push(first..end);
-        first = end;
+        total += room;
+    }
+    if first < lengths.len() {
+        batches.push(first..lengths.len());
     }
     batches
 }
@@ -149,6 +151,16 @@ mod tests {
         let copied = Arena::of(&gpu, "a test", &turned, &[lengths[4], lengths[3]]).unwrap();
         assert!(!same_memory(&copied.buffer, &arena.buffer));
         assert_eq!(download(&gpu, copied.tensor(0)), values[4]);
+    }
+
+    #[test]
+    fn batches_have_every_tensor_once() {
+        let gpu = default_gpu();
+        assert!(batches(&gpu, &[], 2).is_empty());
+        assert_eq!(batches(&gpu, &[1, 0, 5], usize::MAX).first(), Some(&(0..3)));
+        assert_eq!(batches(&gpu, &[9; 5], 2), [0..2, 2..4, 4..5]);
+        // What no buffer holds is alone, and fails later.
+        assert_eq!(batches(&gpu, &[1, 1 << 50, 1, 1], 64), [0..1, 1..2, 2..4]);
     }
 
     #[test]

@@ -115,13 +115,18 @@ pub(crate) struct Places {
 }
 
 impl Places {
+    /// Values that an array of this length takes, with the gap behind it.
+    pub(crate) fn room_of(length: usize) -> usize {
+        length.next_multiple_of(PLACE_ALIGNMENT).max(PLACE_ALIGNMENT)
+    }
+
     pub(crate) fn new(lengths: &[usize]) -> Self {
         let mut total = 0;
         let starts = lengths
             .iter()
             .map(|length| {
                 let start = total;
-                total += length.next_multiple_of(PLACE_ALIGNMENT).max(PLACE_ALIGNMENT);
+                total += Self::room_of(*length);
                 start
             })
             .collect();

@@ -204,7 +204,7 @@ impl ViewPass<'_> {
             // The loss is a mean over the batch; thresholds are those for a single view.
             statistics: ViewStatistics {
                 screen_gradient: offsets.grad_remove(&mut tape).map(|gradient| match self.batch {
-                    0 | 1 => gradient,
+                    1 => gradient,
                     batch => gradient * batch as f32,
                 }),
                 radii: if factor == 1 { rendering.radii } else { rendering.radii * i64::from(factor) },
