@@ -31,6 +31,7 @@ pub mod node_poses;
 pub mod node_regularizer;
 pub mod noise_gradient;
 pub mod normal_cdf;
+pub mod plane_coordinates;
 pub mod plane_query;
 pub mod plane_regularizer;
 #[cfg(feature = "wgpu")]
@@ -72,6 +73,7 @@ pub const ON_GPU: &[GpuOperation] = &[
     node_regularizer::gpu::OPERATION,
     noise_gradient::gpu::OPERATION,
     normal_cdf::gpu::OPERATION,
+    plane_coordinates::gpu::OPERATION,
     plane_query::gpu::OPERATION,
     plane_regularizer::gpu::OPERATION,
     significance::gpu::OPERATION,

@@ -7,7 +7,7 @@ use light4gs_keys::Bounds::Flag;
 use light4gs_keys::keys;
 use nalgebra::{Matrix3, SymmetricEigen, Vector3};
 
-use super::contraction::contract;
+use crate::ops::plane_coordinates::{Standardization, plane_coordinates};
 
 /// Principal component analysis of a point cloud.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -154,22 +154,19 @@ impl SceneCoordinates {
         self.mapping
     }
 
-    /// Standardized coordinates along the principal axes: `[N, 3]` to `[N, 3]`.
-    pub fn standardize(&self, points: Tensor<2>) -> Tensor<2> {
-        (points - self.mean.val()).matmul(self.axes.val() / self.std.val())
-    }
-
     /// Coordinates in [-1, 1]: standardized, by default contracted into the ball of radius 2 and halved. `[N, 3]` to `[N, 3]`.
     pub fn normalize(&self, points: Tensor<2>) -> Tensor<2> {
-        let CoordinateMapping { contracts, scale, offset, .. } = self.mapping;
-        let standardized = self.standardize(points);
-        let points = if contracts { contract(standardized) } else { standardized };
-        if self.mapping == CoordinateMapping::default() {
-            return points * 0.5;
-        }
-        let device = points.device();
-        let row = |values: [f32; 3]| Tensor::<2>::from_floats([values], &device);
-        points * row(scale) + row(offset)
+        plane_coordinates(points, self.standardization(), self.mapping, None)
+    }
+
+    /// The coordinates of [`Self::normalize`] and a time: `[N, 3]` to `[N, 4]`, as hexplanes are queried. `time` is in [0, 1],
+    /// and its coordinate in [-1, 1].
+    pub fn normalize_at(&self, points: Tensor<2>, time: f32) -> Tensor<2> {
+        plane_coordinates(points, self.standardization(), self.mapping, Some(2.0 * time - 1.0))
+    }
+
+    fn standardization(&self) -> Standardization {
+        Standardization { mean: self.mean.val(), axes: self.axes.val(), std: self.std.val() }
     }
 
     /// The field's time for a time of the scene, both in [0, 1].

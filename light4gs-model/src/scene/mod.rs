@@ -1,12 +1,11 @@
 //! The scene (paper III-A): canonical Gaussians, and the field that moves them.
 //!
-//! World points are mapped to the field's coordinates ([`SceneCoordinates`], [`contract`]);
+//! World points are mapped to the field's coordinates ([`SceneCoordinates`]);
 //! [`FeaturePlanes`](crate::FeaturePlanes) give a feature for a point and a time; [`Deformation`] turns the feature
 //! into changes of the Gaussians' attributes; [`DynamicScene`] is the whole. [`regularizer`] keeps the planes smooth.
 
 mod arrays;
 pub mod attributes;
-pub(crate) mod contraction;
 pub(crate) mod coordinates;
 pub(crate) mod dynamic_scene;
 pub(crate) mod field;
@@ -16,7 +15,6 @@ pub mod regularizer;
 
 pub use arrays::ModelError;
 pub use attributes::Attribute;
-pub use contraction::contract;
 pub use coordinates::{CoordinatesConfig, Pca, SceneCoordinates};
 pub use dynamic_scene::{DynamicScene, DynamicSceneConfig};
 pub use field::*;

@@ -3,12 +3,25 @@
 use burn::module::Param;
 use burn::nn::Linear;
 use burn::tensor::{Device, Tensor, s};
+use light4gs_codec::CoordinateMapping;
 use light4gs_codec::plane_layout::PlaneAxes;
 use light4gs_model::{
     Deformation, DeformationConfig, DeformationHead, DynamicScene, FeaturePlanes, GaussianTensors, Gaussians,
-    HexPlaneField, Pca, PlaneTensors, SceneCoordinates, contract,
+    HexPlaneField, Pca, PlaneTensors, SceneCoordinates,
 };
 use light4gs_tests::golden::{Golden, assert_close, assert_close_relative, devices, values_of};
+
+/// World coordinates, contracted.
+fn contracted_world(device: &Device) -> SceneCoordinates {
+    let identity = Pca { mean: [0.0; 3], axes: [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]], std: [1.0; 3] };
+    unscaled(&identity, true, device)
+}
+
+/// Standardized coordinates, contracted or not, neither scaled nor moved.
+fn unscaled(pca: &Pca, contracts: bool, device: &Device) -> SceneCoordinates {
+    let mapping = CoordinateMapping { contracts, scale: [1.0; 3], ..CoordinateMapping::default() };
+    SceneCoordinates::new(pca, device).with_mapping(mapping)
+}
 
 #[test]
 fn contraction() {
@@ -16,7 +29,7 @@ fn contraction() {
     for (name, device) in devices() {
         let device = device.autodiff();
         let x = golden.tensor::<2>("contract.x", &device).require_grad();
-        let out = contract(x.clone());
+        let out = contracted_world(&device).normalize(x.clone());
         assert_close(&format!("{name} contract.out"), &values_of(&out), &golden.values("contract.out"), 1e-5);
         let grads = (out * golden.tensor("contract.w", &device)).sum().backward();
         let gradient = values_of(&x.grad(&grads).unwrap());
@@ -55,7 +68,7 @@ fn scene_coordinates() {
         let device = device.autodiff();
         let frame = SceneCoordinates::new(&pca_of(&golden), &device);
         let points = golden.tensor::<2>("pca.points", &device).require_grad();
-        let standardised = values_of(&frame.standardize(points.clone()));
+        let standardised = values_of(&unscaled(&pca_of(&golden), false, &device).normalize(points.clone()));
         assert_close(&format!("{name} standardised"), &standardised, &golden.values("pca.standardised"), 1e-5);
         let out = frame.normalize(points.clone());
         assert_close(&format!("{name} paper.out_half"), &values_of(&out), &golden.values("paper.out_half"), 1e-5);
@@ -220,7 +233,7 @@ fn reference_query_points(golden: &Golden, xyz: Tensor<2>, device: &Device) -> T
     let (low, high) = (golden.tensor::<2>("full.aabb_min", device), golden.tensor::<2>("full.aabb_max", device));
     let boxed = (xyz - low.clone()) / (high - low) * 2.0 - 1.0;
     let time = golden.tensor::<2>("full.t", device).expand([count, 1]) * 2.0 - 1.0;
-    Tensor::cat(vec![contract(boxed) / 4.0 + 0.5, time], 1)
+    Tensor::cat(vec![contracted_world(device).normalize(boxed) / 4.0 + 0.5, time], 1)
 }
 
 /// Planes, network and attributes together: `full.*` of c03, whose network is that of depth 1.
@@ -240,11 +253,10 @@ fn deformed_gaussians() {
             sh_rest: shs.slice(s![.., 1..coefficients, ..]),
             further: Vec::new(),
         });
-        let identity = Pca { mean: [0.0; 3], axes: [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]], std: [1.0; 3] };
         let GoldenNetwork { network, layers } = network_of(&golden, "depth1", &device);
         let scene = DynamicScene {
             gaussians,
-            coordinates: SceneCoordinates::new(&identity, &device),
+            coordinates: contracted_world(&device),
             field: HexPlaneField { hexplane: hexplane_of(&golden, "full.", &device), deformation: network },
             differentiate_points: false,
         };

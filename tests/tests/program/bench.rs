@@ -70,8 +70,8 @@ fn a_step_does_not_launch_more_kernels_than_before() {
         ("nodes, step with noise", 51),
         ("nodes, step with noise and rate", 123),
         ("nodes, render", 20),
-        ("hexplane, training step", 124),
-        ("hexplane, step with noise and rate", 1186),
+        ("hexplane, training step", 85),
+        ("hexplane, step with noise and rate", 1147),
     ] {
         let found = launches(part);
         assert!((1..=bound + more).contains(&found), "{part}: {found} launches, {bound} before; {adapter}");

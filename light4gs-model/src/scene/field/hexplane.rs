@@ -31,7 +31,7 @@ keys! {
 /// let deformation = DeformationConfig { width: 16, ..Default::default() };
 /// let config = HexPlaneFieldConfig { hexplane, deformation };
 /// let field = HexPlaneField::init(&config, &device);
-/// let offsets = field.offsets(Tensor::zeros([5, 3], &device), 0.25);
+/// let offsets = field.offsets(Tensor::zeros([5, 4], &device));
 /// assert_eq!(offsets.position.unwrap().dims(), [5, 3]);
 /// ```
 #[derive(Module, Debug)]
@@ -54,16 +54,9 @@ impl HexPlaneFieldConfig {
 }
 
 impl HexPlaneField {
-    /// Hexplane coordinates `[N, 4]` of `points [N, 3]` in [-1, 1] at a time in [0, 1].
-    pub fn query_points(points: Tensor<2>, time: f32) -> Tensor<2> {
-        let [count, _] = points.dims();
-        let time = Tensor::full([count, 1], 2.0 * time - 1.0, &points.device());
-        Tensor::cat(vec![points, time], 1)
-    }
-
-    /// Changes of Gaussians at `points [N, 3]`, N > 0, in the scene's coordinates, at a time in [0, 1].
-    pub fn offsets(&self, points: Tensor<2>, time: f32) -> Offsets {
-        self.deformation.forward(self.hexplane.query(Self::query_points(points, time)))
+    /// Changes of Gaussians at the hexplane's coordinates `[N, 4]` of positions and time, N > 0, each in [-1, 1].
+    pub fn offsets(&self, coordinates: Tensor<2>) -> Offsets {
+        self.deformation.forward(self.hexplane.query(coordinates))
     }
 }
 
@@ -79,7 +72,7 @@ impl DeformationField for HexPlaneField {
     }
 
     fn deform(&self, canonical: GaussianTensors, points: ScenePoints<'_>, time: f32) -> GaussianTensors {
-        canonical.offset_by(self.offsets(points.normalized(), time))
+        canonical.offset_by(self.offsets(points.normalized_at(time)))
     }
 
     fn planes(&self) -> Option<&FeaturePlanes> {

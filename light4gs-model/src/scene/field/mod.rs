@@ -58,6 +58,11 @@ impl<'a> ScenePoints<'a> {
     pub fn normalized(self) -> Tensor<2> {
         self.coordinates.normalize(self.means)
     }
+
+    /// The positions and a time in [0, 1] as coordinates of a hexplane, `[N, 4]`, each in [-1, 1].
+    pub fn normalized_at(self, time: f32) -> Tensor<2> {
+        self.coordinates.normalize_at(self.means, time)
+    }
 }
 
 /// A deformation field over space and time (paper III-A).
