@@ -73,6 +73,7 @@ mod exchange;
 mod faults;
 mod frame;
 mod images;
+mod jumps;
 mod known;
 mod layouts;
 mod lens;
@@ -105,6 +106,7 @@ pub use frame::{Frame, Mask, MaskMeaning};
 pub use images::{
     ImageStore, PixelMask, Region, RgbImage8, RgbImage32, composite, composite_resized, image_size, regions,
 };
+pub use jumps::turn_between_frames;
 pub use known::KnownCopy;
 pub use layouts::{Colmap, DNerf, DatasetLayout, HyperNerf, Layouts, NerfDs, Nerfstudio, Neu3d};
 pub use lens::{Distortion, Lens};

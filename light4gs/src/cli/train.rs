@@ -106,6 +106,7 @@ impl Train {
             return Err(TrainError::Input("--jobs and --launcher are for takes; give --segment SECONDS too".into()));
         }
         let Some(length) = self.segment else {
+            let preset = if automatic { self.wishes.preset_for(preset, &overrides, &scene)? } else { preset };
             let config = self.wishes.config(&preset, &overrides, &scene, automatic, self.output.quiet)?;
             return train(on_chosen_device(config), &scene, &self.out, self.overwrite, &self.output);
         };
