@@ -46,11 +46,11 @@ pub(super) struct Export {
     /// The .l4gs file, a scene or a take; or the folder of a run or of a take.
     #[arg(value_name = "FILE|RUN")]
     file: PathBuf,
-    /// Folder or file; its name says what is written. A folder (no suffix, a slash at the end, or an existing folder) gets
-    /// `0000.ply`, `0001.ply`, ...; it must not hold numbered PLY files of another sequence. .zip: the same PLY files. .ply: a
-    /// single time. .4dgs: the whole motion. .glb (KHR_gaussian_splatting): the whole motion of control nodes (skin and
-    /// animation), or a single time for other fields and with --time. From a take, .ply and .glb files have a single time (--at,
-    /// --base); --to glb writes a .glb for each segment.
+    /// Folder or file; the suffix of its name chooses the format. A folder (no suffix, a slash at the end, or an existing
+    /// folder) gets `0000.ply`, `0001.ply`, ...; it must not hold numbered PLY files of another sequence. .zip: the same PLY
+    /// files. .ply: a single time. .4dgs: the whole motion. .glb (KHR_gaussian_splatting): the whole motion of control nodes
+    /// (skin and animation), or a single time for other fields and with --time. From a take, .ply and .glb files have a single
+    /// time (--at, --base); --to glb writes a .glb for each segment.
     #[arg(long, required_unless_present_any = ["html", "site"])]
     out: Option<PathBuf>,
     /// Files of the folder. ply: a file for each frame. glb, for takes only: a file for each segment, with its motion and what
