@@ -38,7 +38,7 @@ use super::view::dataset_cameras;
 
 /// Most cameras of each split in a page: enough to choose from, few enough to send.
 const MOST_CAMERAS: usize = 60;
-/// Frames a second, so that times of frames are different numbers.
+/// Frames per second, so that times of frames are different numbers.
 const FPS: RangeInclusive<f64> = 1e-3..=1e5;
 
 #[derive(Debug, Args)]
@@ -86,7 +86,7 @@ pub(super) struct Export {
     /// A single time, in [0, 1], for a .ply or .glb file. An output that can hold only one time gets time 0 by default.
     #[arg(long, allow_negative_numbers = true, conflicts_with_all = ["frames", "fps"])]
     time: Option<f32>,
-    /// Frames a second of a .4dgs, of a .glb with motion, and of the PLY files of a take; by default those of the source, or
+    /// Frames per second of a .4dgs, of a .glb with motion, and of the PLY files of a take; by default those of the source, or
     /// 30.
     #[arg(long, allow_negative_numbers = true)]
     fps: Option<f32>,
@@ -169,7 +169,7 @@ impl Export {
         if is_take_file(&self.file) { self.export_take(path, target) } else { self.export_clip(path, target) }
     }
 
-    /// Frames a second: as requested, or those of the source, or 30.
+    /// Frames per second: as requested, or those of the source, or 30.
     fn fps(&self, source: f32) -> Result<f64, TrainError> {
         let source = Some(source).filter(|fps| *fps > 0.0);
         let fps = f64::from(self.fps.or(source).unwrap_or(30.0));
@@ -178,7 +178,7 @@ impl Export {
             _ if FPS.contains(&fps) => Ok(fps),
             Some(fps) => Err(TrainError::Input(format!("--fps must be {least} to {most}, not {fps}"))),
             None => Err(TrainError::Input(format!(
-                "the file says that it has {fps} frames a second, expected {least} to {most}; give a number with --fps"
+                "the file says that it has {fps} frames per second, expected {least} to {most}; give a number with --fps"
             ))),
         }
     }
