@@ -74,7 +74,7 @@ pub(super) struct Export {
     /// The address at which the folder of --site will be. Previews of links need it.
     #[arg(long, value_name = "ADDRESS", requires = "site")]
     url: Option<String>,
-    /// The title of the page, and of previews of its link; by default the name that the file has.
+    /// The title of the page, and of previews of its link; by default the name stored in the file.
     #[arg(long, value_name = "TEXT", conflicts_with = "out")]
     title: Option<String>,
     /// Dataset whose cameras the page offers; by default that of the run whose folder holds the file.
