@@ -15,7 +15,7 @@ pub(crate) fn usual_step(times: &[f32]) -> Option<f32> {
     steps.get(steps.len() / 2).copied()
 }
 
-/// Seconds from time 0 to time 1, where different, rising times are those of frames at a rate, frames a second.
+/// Seconds from time 0 to time 1, where different, rising times are those of frames at a rate, frames per second.
 pub(crate) fn seconds_at_rate(times: &[f32], rate: f64) -> Option<f64> {
     let (first, last) = (times.first()?, times.last()?);
     let span = f64::from(*last) - f64::from(*first);

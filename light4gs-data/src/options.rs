@@ -48,7 +48,7 @@ pub enum TimesFrom {
     Auto,
     /// From the last number.
     Number,
-    /// From the natural order of the names of each camera: one step a name.
+    /// From the natural order of the names of each camera: one step per name.
     Order,
 }
 
@@ -74,7 +74,7 @@ pub struct LoadOptions {
     /// Length of the sequence in frames: later ones are left out. Where the dataset counts frames instead of giving
     /// times (layout `neu3d`, whose captures have 300), the time of frame `i` is `i / frames`. `None`: all frames.
     pub frames: Option<usize>,
-    /// Frames a second at which the capture was taken, 0.001 to 100000: its different times are counted as frames, whatever its files
+    /// Frames per second at which the capture was taken, 0.001 to 100000: its different times are counted as frames, whatever its files
     /// say. `None`: as the files say, see [`crate::Scene::seconds`].
     pub frames_a_second: Option<f64>,
     /// First and last time that is kept, shares of the whole: see [`crate::Scene::between`]. `None`: all.

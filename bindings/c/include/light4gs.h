@@ -105,7 +105,7 @@ typedef struct L4gsInfo {
   uint32_t sh_coefficients;
   // Number of frames of the source; time 0 is the first, time 1 the last.
   uint32_t frames;
-  // Frames a second of the source, 0 where not known.
+  // Frames per second of the source, 0 where not known.
   float fps;
   // Smallest corner of the scene's box, world units.
   float bounds_min[3];
@@ -182,7 +182,7 @@ typedef struct L4gsCamera {
 typedef struct L4gsTakeInfo {
   // Seconds of the take: what the file says, or the end of the last segment where that is later.
   double seconds;
-  // Frames a second of the source, 0 where not known.
+  // Frames per second of the source, 0 where not known.
   float fps;
   // Number of segments; see `l4gs_take_segment`.
   uint32_t segments;

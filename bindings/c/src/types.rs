@@ -151,7 +151,7 @@ pub struct L4gsInfo {
     pub sh_coefficients: u32,
     /// Number of frames of the source; time 0 is the first, time 1 the last.
     pub frames: u32,
-    /// Frames a second of the source, 0 where not known.
+    /// Frames per second of the source, 0 where not known.
     pub fps: f32,
     /// Smallest corner of the scene's box, world units.
     pub bounds_min: [f32; 3],
@@ -179,7 +179,7 @@ pub struct L4gsInfo {
 pub struct L4gsTakeInfo {
     /// Seconds of the take: what the file says, or the end of the last segment where that is later.
     pub seconds: f64,
-    /// Frames a second of the source, 0 where not known.
+    /// Frames per second of the source, 0 where not known.
     pub fps: f32,
     /// Number of segments; see `l4gs_take_segment`.
     pub segments: u32,

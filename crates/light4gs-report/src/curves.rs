@@ -47,7 +47,7 @@ pub(super) fn section(metrics: &[MetricsRecord]) -> String {
             true,
         ),
         chart(
-            "Iterations a second",
+            "Iterations per second",
             vec![series("it/s", Mark::Line, thinned(&points(&|r| r.iterations_per_second)))],
             false,
             true,

@@ -8,7 +8,7 @@ use super::page_of;
 /// The page.
 pub fn take_page(title: &str, evaluation: &TakeEvaluation) -> String {
     let about = format!(
-        "{} bytes, {} segments, {:.2} kB a frame, base {} bytes",
+        "{} bytes, {} segments, {:.2} kB per frame, base {} bytes",
         evaluation.bytes, evaluation.segments, evaluation.kilobytes_a_frame, evaluation.base_bytes
     );
     let charts = [

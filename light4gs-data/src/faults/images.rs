@@ -102,7 +102,7 @@ pub(super) fn fast(curves: &[CameraCurve]) -> Option<String> {
     (usual > TOO_FAST).then(|| {
         format!(
             "things move too fast for the rate: from one image to the next they differ by {:.0} % of what images far apart do; \
-             record with more frames a second, or take more frames of the video",
+             record with more frames per second, or take more frames of the video",
             100.0 * usual
         )
     })

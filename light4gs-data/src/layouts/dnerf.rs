@@ -27,7 +27,7 @@ use std::path::{Path, PathBuf};
 /// Frames, distance to the origin (world units) and elevation (degrees) of the video path.
 const VIDEO_PATH: (usize, f32, f32) = (160, 4.0, 30.0);
 
-/// The layout `dnerf`: Blender transforms with a time for each frame, one file a split.
+/// The layout `dnerf`: Blender transforms with a time for each frame, one file per split.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct DNerf;
 

@@ -63,7 +63,7 @@ fn camera(x: f32, y: f32) -> Camera {
     Camera::look_at(Vec3::new(x, y, 2.0), Vec3::new(0.2 * x, 0.0, -2.5), Vec3::Y, FOV, SIZE.0, SIZE.1)
 }
 
-/// Films at ten frames a second, or so that the frames are shown at some times.
+/// Films at ten frames per second, or so that the frames are shown at some times.
 fn film(folder: &Path, name: &str, cameras: &[Camera], times: Option<&[f64]>) -> PathBuf {
     let frames = folder.join(format!("{name}-frames"));
     fs::create_dir_all(&frames).unwrap();

@@ -308,7 +308,7 @@ impl Attribute {
             Start::Zeros => vec![0.0; count * width],
             Start::Cloud(start) => start(cloud, config),
         };
-        assert_eq!(values.len(), count * width, "the start of `{}` must be {width} numbers a Gaussian", self.name);
+        assert_eq!(values.len(), count * width, "the start of `{}` must be {width} numbers per Gaussian", self.name);
         values
     }
 }

@@ -15,7 +15,7 @@ choice! {
         Auto = "auto",
         /// The last number.
         Number = "number",
-        /// The natural order of each camera's names, one step a name.
+        /// The natural order of each camera's names, one step per name.
         Order = "order",
     }
 }
@@ -69,7 +69,7 @@ keys! {
         frames: Option<usize> = None;
             WholeOrNone { least: 1, most: 1_000_000 },
             "reference, Neu3D: 300";
-        /// Frames a second of the capture, by which its seconds are counted. Below 0.001: as its files say, where they do.
+        /// Frames per second of the capture, by which its seconds are counted. Below 0.001: as its files say, where they do.
         frames_a_second: f64 = 0.0; Number { least: 0.0, most: 1e5 }, "ours";
         /// First and last time of the images that are used, as shares of the capture: of a take, those of a segment.
         between: [f64; 2] = [0.0, 1.0]; List { element: &SHARE, length: Some(2) }, "ours";

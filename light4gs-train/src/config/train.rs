@@ -90,7 +90,7 @@ keys! {
     pub struct CoarseToFineConfig {
         /// Images have a quarter of their width and height until this share of the fine stage is over. 0: never.
         quarter_until: f64 = 0.0; SHARE, "ours";
-        /// They have half of them until this share is over.
+        /// Images have half of their width and height until this share of the fine stage is over. 0: never.
         half_until: f64 = 0.0; SHARE, "ours";
     }
 }

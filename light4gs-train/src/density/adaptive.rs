@@ -205,7 +205,7 @@ impl DensityStrategy for AdaptiveDensityControl {
             let tensor = state.remove(name).ok_or_else(|| wrong("is missing".to_owned()))?;
             match tensor.dims() {
                 [found] if found == count => {}
-                [found] => return Err(wrong(format!("has {found} values, expected {count}, one a Gaussian"))),
+                [found] => return Err(wrong(format!("has {found} values, expected {count}, one per Gaussian"))),
             }
             match tensor.to_data().iter::<f32>().find(|value| *value < 0.0) {
                 Some(value) => Err(wrong(format!("has the value {value}, expected none below 0"))),

@@ -17,7 +17,7 @@ keys! {
         iterations: Vec<usize> = vec![15_001, 20_000];
             List { element: &INTERVAL, length: None },
             "paper: mid-way and near the end";
-        /// The addend of a pixel to the score of each Gaussian that it blends.
+        /// What a pixel adds to the score of each Gaussian that it blends.
         score: PruneScore = PruneScore::Transmittance;
             PruneScore::BOUNDS, "paper; the reference sums the opacity";
         /// Factor of the volume V.
@@ -31,11 +31,11 @@ keys! {
 }
 
 choice! {
-    /// The addend of a pixel to the score of each Gaussian that it blends.
+    /// What a pixel adds to the score of each Gaussian that it blends.
     pub enum PruneScore: "score" {
         /// Transmittance before the Gaussian times its opacity: the paper's.
         Transmittance = "transmittance",
-        /// The squared change of the pixel's color without the Gaussian (after SpeeDe3DGS).
+        /// The squared change of the pixel's color if the Gaussian is removed (after SpeeDe3DGS).
         Sensitivity = "sensitivity",
     }
 }

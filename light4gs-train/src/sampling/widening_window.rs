@@ -12,7 +12,7 @@ keys! {
     /// to the new ones. A survey (`survey`) shows all times first, so that the field finds where objects are. The coarse
     /// stage sees the times with which the fine stage begins.
     pub struct WideningWindow {
-        /// The share of the fine stage for which all times are seen before the first window.
+        /// Length of the survey, as a share of the fine stage: frames of all times are drawn before the first window begins.
         survey: f64 = 0.0; SHARE, "ours";
         /// The middle of the first window.
         center: f64 = 0.5; SHARE, "ours";

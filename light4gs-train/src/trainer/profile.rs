@@ -120,7 +120,7 @@ impl Profile {
         let of_all = |number: fn(&Part) -> f64| laps.parts.iter().map(number).sum::<f64>();
         let step = Part { name: "step", laps: vec![of_all(Part::time)], work: of_all(|part| part.work) };
         let is_told = laps.last_work.is_some();
-        let mut columns = vec![("part", Align::Left), ("ms a step", Align::Right), ("share", Align::Right)];
+        let mut columns = vec![("part", Align::Left), ("ms per step", Align::Right), ("share", Align::Right)];
         columns.extend(is_told.then_some(("threads busy", Align::Right)));
         let mut table = Table::new(columns);
         let row = |part: &Part| {

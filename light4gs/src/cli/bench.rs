@@ -36,7 +36,8 @@ pub(super) struct Bench {
     /// Time the entropy coders instead, on a scene of the paper's size.
     #[arg(long, conflicts_with_all = ["scene", "gaussians", "size", "device"])]
     codec: bool,
-    /// Time the work of the CPU in a step on a GPU instead: 100 Gaussians at 32×32, with launches and read-backs.
+    /// Instead, time what the CPU does during a training step on a GPU (100 Gaussians at 32×32), and count launches and
+    /// read-backs.
     #[arg(long, conflicts_with_all = ["scene", "gaussians", "size", "codec"])]
     host: bool,
     /// Print as JSON, with command, commit, machine and date: the form of the files in `results/`.

@@ -219,7 +219,7 @@ fn print_info(info: &StreamInfo, json: bool) -> Result<(), TrainError> {
                 "latent": p.latent, "anchors": p.anchors, "others": p.others})).collect::<Vec<_>>(),
         }));
     }
-    let rate = if *fps > 0.0 { format!(" at {fps} frames a second") } else { String::new() };
+    let rate = if *fps > 0.0 { format!(" at {fps} frames per second") } else { String::new() };
     say(format_args!("{name}: version {}, {width}×{height}, {frame_count} times{rate}", info.version))?;
     say(format_args!("{} Gaussians, spherical harmonics of degree {}", info.gaussian_count, info.sh_degree))?;
     for (number, LayerInfo { gaussians, bytes_to_show }) in (1..).zip(&info.layers).filter(|_| info.layers.len() > 1) {

@@ -127,7 +127,7 @@ enum Command {
     /// Print what differs between runs: program and machine, configuration, results.
     #[command(after_help = "Example:\n  light4gs compare runs/one runs/other")]
     Compare(compare::Compare),
-    /// Print what an issue should say: version, machine, devices, last error. It contains no paths or names of yours.
+    /// Print what an issue should say: version, machine, devices, last error. It contains none of your paths or names.
     #[command(after_help = "Example:\n  light4gs report")]
     Report(report::Report),
     /// Time every part of a training step on one or more devices.

@@ -57,7 +57,7 @@ pub(super) struct Render {
     /// Height of the orbit in degrees.
     #[arg(long, default_value_t = ORBIT.1, allow_negative_numbers = true)]
     elevation: f32,
-    /// Frames a second of a GIF or an MP4.
+    /// Frames per second of a GIF or an MP4.
     #[arg(long, default_value_t = 20.0, allow_negative_numbers = true)]
     fps: f32,
     /// Back end: auto (a graphics card if there is one), flex or ndarray (both on the processor), wgpu, or wgpu with an adapter

@@ -40,7 +40,7 @@ struct Take {
     /// Cameras of a take: one camera moves; several cameras stand still, and there is one more for testing [default: 1].
     #[arg(long, requires = "seconds", allow_negative_numbers = true)]
     cameras: Option<usize>,
-    /// Frames a second of a take [default: 30].
+    /// Frames per second of a take [default: 30].
     #[arg(long, requires = "seconds", allow_negative_numbers = true)]
     fps: Option<f64>,
     /// Width of a take's images in pixels [default: 320].

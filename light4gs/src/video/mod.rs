@@ -37,7 +37,7 @@ pub(crate) fn write_gif<E: From<DataError>>(
         return Err(E::from(DataError::Field {
             path: path.to_path_buf(),
             field: "fps".to_owned(),
-            problem: format!("{fps} frames a second, where a GIF has more than 0 and up to {MAX_GIF_FPS}"),
+            problem: format!("{fps} frames per second, where a GIF has more than 0 and up to {MAX_GIF_FPS}"),
             remedy: "choose another rate, or write PNG files".to_owned(),
         }));
     }

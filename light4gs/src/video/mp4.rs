@@ -26,7 +26,7 @@ pub(crate) fn write_mp4<E: From<DataError>>(
 ) -> Result<usize, E> {
     let wrong = |field: &str, problem: String, remedy: &str| DataError::field(path, field, problem, remedy);
     if !(fps > 0.0 && fps.is_finite()) {
-        return Err(wrong("fps", format!("{fps} frames a second"), "choose a positive rate").into());
+        return Err(wrong("fps", format!("{fps} frames per second"), "choose a positive rate").into());
     }
     // Beside the file, so that renaming it stays on one file system. ffmpeg is told the format, since it cannot tell
     // from the name.

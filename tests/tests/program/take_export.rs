@@ -84,7 +84,7 @@ fn frames_of_a_take_are_those_of_its_seconds() {
     }
     assert!(exported(&w, &["--out", "frames.zip", "--fps", "2"]).contains("8 PLY files"));
     let text = exported(&w, &["--out", "take.4dgs"]);
-    assert!(text.contains("20 samples") && text.contains("4.00 seconds, 5 frames a second"), "{text}");
+    assert!(text.contains("20 samples") && text.contains("4.00 seconds, 5 frames per second"), "{text}");
     assert!(fs::metadata(w.path("take.4dgs")).unwrap().len() > 1000);
     exported(&w, &["--out", "one.ply", "--at", "1.7"]);
     assert_frame(&w.path("one.ply"), &shown, 1.7);

@@ -10,7 +10,7 @@ use light4gs_codec::take::Take;
 use light4gs_tests::program::{TINY, TINY_COMPRESSION, Workspace, assert_refused, assert_success};
 use serde_json::Value;
 
-/// Three seconds of a rig, ten frames a second.
+/// Three seconds of a rig, ten frames per second.
 fn filmed() -> Workspace {
     let w = Workspace::new(PROGRAM);
     let options = ["--seconds", "3", "--cameras", "3", "--fps", "10", "--width", "48", "--height", "36"];

@@ -89,7 +89,7 @@ class Scene:
     name: str
     #: Frames of the source; time 0 is the first, time 1 the last.
     frame_count: int
-    #: Frames a second of the source, 0 where not known.
+    #: Frames per second of the source, 0 where not known.
     fps: float
     #: ``[2, 3]``: smallest and largest corner of the scene's box, world units.
     bounds: Floats

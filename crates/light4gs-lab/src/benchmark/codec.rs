@@ -38,7 +38,7 @@ pub struct CoderTime {
 }
 
 impl CoderTime {
-    /// Million symbols a second, all threads.
+    /// Million symbols per second, all threads.
     pub fn megasymbols(&self) -> f64 {
         self.symbols as f64 / self.milliseconds / 1e3
     }

@@ -64,7 +64,7 @@ choice! {
         DecodePerFrame = "decode_per_frame",
         /// Encoding, decoding and rendering of one frame: milliseconds.
         EndToEnd = "end_to_end",
-        /// Frames a second, decoding excluded.
+        /// Frames per second, decoding excluded.
         Fps = "fps",
     }
 }
@@ -96,10 +96,10 @@ impl Measure {
             Self::FitSeconds => "fitting, s",
             Self::EncodeSeconds => "encoding, s",
             Self::DecodeSeconds => "decoding, s",
-            Self::RenderMilliseconds => "rendering, ms a frame",
-            Self::EncodePerFrame => "encoding, ms a frame",
-            Self::DecodePerFrame => "decoding, ms a frame",
-            Self::EndToEnd => "end to end, ms a frame",
+            Self::RenderMilliseconds => "rendering, ms per frame",
+            Self::EncodePerFrame => "encoding, ms per frame",
+            Self::DecodePerFrame => "decoding, ms per frame",
+            Self::EndToEnd => "end to end, ms per frame",
             Self::Fps => "FPS",
         }
     }

@@ -60,7 +60,7 @@ pub struct RunResult {
     /// Seconds of decoding.
     #[serde(skip)]
     pub decode_seconds: f64,
-    /// Frames a second.
+    /// Frames per second.
     #[serde(skip)]
     pub fps: f64,
     /// The device on which it was measured.

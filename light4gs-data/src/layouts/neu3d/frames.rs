@@ -15,7 +15,7 @@ use std::path::{Path, PathBuf};
 
 /// Up to this share of a camera's pictures may have another size than the others, or no number: they are strays.
 const STRAYS: f64 = 0.1;
-/// Rates, frames a second, that differ by a larger share are different.
+/// Rates, frames per second, that differ by a larger share are different.
 const OTHER_RATE: f64 = 0.01;
 /// Videos of different rates must last equally long, up to this factor.
 const OTHER_DURATION: f64 = 1.1;
@@ -34,7 +34,7 @@ pub(super) struct RigFrame {
 pub(super) struct Rig {
     /// Those of each camera.
     pub(super) frames: Vec<Vec<RigFrame>>,
-    /// Frames a second, where all were taken from videos.
+    /// Frames per second, where all were taken from videos.
     pub(super) rate: Option<f64>,
 }
 
@@ -168,7 +168,7 @@ fn by_numbers(lists: Vec<Vec<PathBuf>>, notes: &mut Vec<String>) -> Vec<Vec<RigF
 struct Clock {
     /// Those of each camera, in frames from the first of the rig.
     instants: Vec<Vec<f64>>,
-    /// Frames a second.
+    /// Frames per second.
     rate: f64,
 }
 
@@ -196,7 +196,7 @@ fn by_times(
     let usual = of_camera.iter().position(|other| *other == rate).unwrap_or(0);
     let differs = |other: f64| (other / rate - 1.0).abs() > OTHER_RATE;
     let others: Vec<usize> = (0..records.len()).filter(|i| differs(of_camera[*i])).collect();
-    let says = |i: usize| format!("{:.2} frames a second in {:.2} s", of_camera[i], durations[i]);
+    let says = |i: usize| format!("{:.2} frames per second in {:.2} s", of_camera[i], durations[i]);
     let ratio = |i: usize| (durations[i] / durations[usual]).max(durations[usual] / durations[i]);
     if let Some(worst) = others.iter().copied().max_by(|a, b| ratio(*a).total_cmp(&ratio(*b))) {
         let (video, reference) = (&records[worst].video, &records[usual].video);

@@ -27,7 +27,7 @@ use frames::{Rig, RigFrame};
 use glam::{DMat3, DVec3};
 use std::path::Path;
 
-/// Frames a second of the dataset, as its authors say. Frames in folders do not say it.
+/// Frames per second of the dataset, as its authors say. Frames in folders do not say it.
 const RATE: f64 = 30.0;
 /// Numbers of a row: a pose of 3 × 5, and the nearest and farthest depth.
 const COLUMNS: usize = 17;

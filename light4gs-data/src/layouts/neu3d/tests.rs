@@ -62,14 +62,14 @@ fn cameras_of_a_rig_have_one_clock() {
     assert!(scene.seconds.is_some_and(|seconds| (seconds - 0.4).abs() < 1e-3), "{:?}", scene.seconds);
     // Another rate in the same time: each frame when it is shown.
     let scene = Rig::new(&[&usual, &usual, &slow]).open(None).unwrap();
-    assert!(scene.notes.iter().any(|note| note.contains("25.00 frames a second")), "{:?}", scene.notes);
+    assert!(scene.notes.iter().any(|note| note.contains("25.00 frames per second")), "{:?}", scene.notes);
     for (k, time) in Rig::times(&scene, 2).into_iter().enumerate() {
         assert!((time - k as f32 / 25.0 / 0.4).abs() < 1e-3, "{time} of frame {k}");
     }
     // As many frames at another rate: nobody knows which clock is right.
     let other = clip(folder.path(), "other.mp4", 12, 20.0, &[]);
     let message = Rig::new(&[&usual, &usual, &other]).open(None).unwrap_err();
-    for word in ["cam02.mp4", "20.00 frames a second in 0.60 s", "30.00 frames a second in 0.40 s", "; bring all"] {
+    for word in ["cam02.mp4", "20.00 frames per second in 0.60 s", "30.00 frames per second in 0.40 s", "; bring all"] {
         assert!(message.contains(word), "{message}");
     }
 }

@@ -11,8 +11,8 @@ const OTHER_STEP: f64 = 0.05;
 
 /// Seconds from time 0 to time 1 of a transforms file; `None` where it does not say.
 ///
-/// `seconds` is what `light4gs prepare` writes. `fps`, frames a second, is what other programs write: with it, `times`, those of
-/// the frames as the file gives them, are seconds, or whole numbers of frames, or shares of the whole, one step a frame; without
+/// `seconds` is what `light4gs prepare` writes. `fps`, frames per second, is what other programs write: with it, `times`, those of
+/// the frames as the file gives them, are seconds, or whole numbers of frames, or shares of the whole, one step per frame; without
 /// times, the numbers in the images' names count frames.
 pub(in crate::layouts) fn seconds_of(
     path: &Path,

@@ -24,7 +24,7 @@ pub(crate) enum Pace {
     All,
     /// The first frame of each stretch of time; so many stretches a second.
     FirstOfEach(f64),
-    /// As many frames a second, evenly: frames are left out or doubled.
+    /// As many frames per second, evenly: frames are left out or doubled.
     Resampled(f64),
 }
 

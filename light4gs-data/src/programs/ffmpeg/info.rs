@@ -9,7 +9,7 @@ use std::path::Path;
 pub(crate) struct VideoInfo {
     /// Seconds; 0 where the container does not say.
     pub(crate) duration: f64,
-    /// Frames a second, in the mean; 0 where the container does not say.
+    /// Frames per second, in the mean; 0 where the container does not say.
     pub(crate) rate: f64,
     /// The transfer function, if it is one of a high dynamic range.
     pub(crate) hdr: Option<Hdr>,

@@ -73,7 +73,7 @@ impl Taken {
         std::fs::remove_dir_all(folder).map_err(DataError::io("remove", folder))
     }
 
-    /// Frames a second in the mean; 0 for a single frame.
+    /// Frames per second in the mean; 0 for a single frame.
     pub(crate) fn rate(&self) -> f64 {
         let last = self.seconds.last().copied().unwrap_or(0.0);
         if last > 0.0 { (self.seconds.len() - 1) as f64 / last } else { 0.0 }

@@ -44,7 +44,7 @@ pub struct TakeOptions {
     pub seconds: f64,
     /// Cameras to train on: 1 moves on a smooth path; 2 to 64 stand still, with one more for testing.
     pub cameras: usize,
-    /// Frames a second; 1 to 240.
+    /// Frames per second; 1 to 240.
     pub frames_a_second: f64,
     /// Width of the images, pixels; 8 to 4096.
     pub width: u32,
@@ -59,7 +59,7 @@ pub struct TakeOptions {
 }
 
 impl Default for TakeOptions {
-    /// 60 seconds at 30 frames a second of one moving camera, 320 × 240 pixels, without a cut, in the same light; seed 0.
+    /// 60 seconds at 30 frames per second of one moving camera, 320 × 240 pixels, without a cut, in the same light; seed 0.
     fn default() -> Self {
         Self {
             seconds: 60.0,

@@ -38,7 +38,7 @@ use super::view::dataset_cameras;
 
 /// Most cameras of each split in a page: enough to choose from, few enough to send.
 const MOST_CAMERAS: usize = 60;
-/// Frames a second, so that times of frames are different numbers.
+/// Frames per second, so that times of frames are different numbers.
 const FPS: RangeInclusive<f64> = 1e-3..=1e5;
 
 #[derive(Debug, Args)]
@@ -46,11 +46,11 @@ pub(super) struct Export {
     /// The .l4gs file, a scene or a take; or the folder of a run or of a take.
     #[arg(value_name = "FILE|RUN")]
     file: PathBuf,
-    /// Folder or file; its name says what is written. A folder (no suffix, a slash at the end, or an existing folder) gets
-    /// `0000.ply`, `0001.ply`, ...; it must not hold numbered PLY files of another sequence. .zip: the same PLY files. .ply: a
-    /// single time. .4dgs: the whole motion. .glb (KHR_gaussian_splatting): the whole motion of control nodes (skin and
-    /// animation), or a single time for other fields and with --time. From a take, .ply and .glb files have a single time (--at,
-    /// --base); --to glb writes a .glb for each segment.
+    /// Folder or file; the suffix of its name chooses the format. A folder (no suffix, a slash at the end, or an existing
+    /// folder) gets `0000.ply`, `0001.ply`, ...; it must not hold numbered PLY files of another sequence. .zip: the same PLY
+    /// files. .ply: a single time. .4dgs: the whole motion. .glb (KHR_gaussian_splatting): the whole motion of control nodes
+    /// (skin and animation), or a single time for other fields and with --time. From a take, .ply and .glb files have a single
+    /// time (--at, --base); --to glb writes a .glb for each segment.
     #[arg(long, required_unless_present_any = ["html", "site"])]
     out: Option<PathBuf>,
     /// Files of the folder. ply: a file for each frame. glb, for takes only: a file for each segment, with its motion and what
@@ -74,7 +74,7 @@ pub(super) struct Export {
     /// The address at which the folder of --site will be. Previews of links need it.
     #[arg(long, value_name = "ADDRESS", requires = "site")]
     url: Option<String>,
-    /// The title of the page, and of previews of its link; by default the name that the file has.
+    /// The title of the page, and of previews of its link; by default the name stored in the file.
     #[arg(long, value_name = "TEXT", conflicts_with = "out")]
     title: Option<String>,
     /// Dataset whose cameras the page offers; by default that of the run whose folder holds the file.
@@ -86,7 +86,7 @@ pub(super) struct Export {
     /// A single time, in [0, 1], for a .ply or .glb file. An output that can hold only one time gets time 0 by default.
     #[arg(long, allow_negative_numbers = true, conflicts_with_all = ["frames", "fps"])]
     time: Option<f32>,
-    /// Frames a second of a .4dgs, of a .glb with motion, and of the PLY files of a take; by default those of the source, or
+    /// Frames per second of a .4dgs, of a .glb with motion, and of the PLY files of a take; by default those of the source, or
     /// 30.
     #[arg(long, allow_negative_numbers = true)]
     fps: Option<f32>,
@@ -169,7 +169,7 @@ impl Export {
         if is_take_file(&self.file) { self.export_take(path, target) } else { self.export_clip(path, target) }
     }
 
-    /// Frames a second: as requested, or those of the source, or 30.
+    /// Frames per second: as requested, or those of the source, or 30.
     fn fps(&self, source: f32) -> Result<f64, TrainError> {
         let source = Some(source).filter(|fps| *fps > 0.0);
         let fps = f64::from(self.fps.or(source).unwrap_or(30.0));
@@ -178,7 +178,7 @@ impl Export {
             _ if FPS.contains(&fps) => Ok(fps),
             Some(fps) => Err(TrainError::Input(format!("--fps must be {least} to {most}, not {fps}"))),
             None => Err(TrainError::Input(format!(
-                "the file says that it has {fps} frames a second, expected {least} to {most}; give a number with --fps"
+                "the file says that it has {fps} frames per second, expected {least} to {most}; give a number with --fps"
             ))),
         }
     }

@@ -16,7 +16,7 @@ pub(super) struct NodesMotion<'a> {
     /// The scene's own.
     pub(super) nodes: &'a NodesField,
     pub(super) keyframes: u32,
-    /// Keyframes a second.
+    /// Keyframes per second.
     pub(super) fps: f64,
     /// The time of a keyframe, in [0, 1]; with fractions between keyframes.
     pub(super) time: &'a dyn Fn(f32) -> f32,

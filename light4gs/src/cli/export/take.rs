@@ -141,7 +141,7 @@ impl Export {
         }
         let fps = frames.fps;
         say(format_args!(
-            "{:.2} seconds, {fps} frames a second{}",
+            "{:.2} seconds, {fps} frames per second{}",
             f64::from(frames.count) / fps,
             frames.without_segment()
         ))
@@ -271,7 +271,7 @@ impl SegmentsReport {
 /// The keyframes of a segment: at its begin, at its end, and at equal distances between them.
 struct Keyframes {
     count: u32,
-    /// Keyframes a second, near to those that were asked for.
+    /// Keyframes per second, near to those that were asked for.
     fps: f64,
 }
 
@@ -314,7 +314,7 @@ mod tests {
         assert_eq!(count(2.9, &[], 10.0), 30);
         assert_eq!(count(0.0, &[], 10.0), 1);
         assert_eq!(count(3.0, &[(0.0, 3.0)], 10.0), 30);
-        // 30000/1001 frames a second, in float32.
+        // 30000/1001 frames per second, in float32.
         let fps = f64::from(30_000.0_f32 / 1001.0);
         assert_eq!(count(0.0, &[(0.0, 1800.0 * 1001.0 / 30_000.0)], fps), 1800);
         assert!(Frames::of(take(1e6, &[]).index(), 30.0).is_err_and(|error| error.to_string().contains("--fps")));

@@ -74,7 +74,7 @@ fn print(evaluation: &TakeEvaluation, json: bool) -> Result<(), TrainError> {
     row("flicker", &evaluation.flicker, 5);
     say(table)?;
     say(format_args!(
-        "{} bytes in {} segments, {:.2} kB a frame; {} frames measured",
+        "{} bytes in {} segments, {:.2} kB per frame; {} frames measured",
         evaluation.bytes,
         evaluation.segments,
         evaluation.kilobytes_a_frame,
@@ -101,7 +101,7 @@ pub(in crate::cli) fn info(file: &Path, limits: &Limits, json: bool) -> Result<(
             "base": {"offset": index.base().start, "bytes": base_bytes, "gaussians": index.base_gaussians()},
             "segments": segments}));
     }
-    say(format_args!("{}: a take of {:.2} seconds, {} frames a second", meta.name, meta.seconds, meta.fps))?;
+    say(format_args!("{}: a take of {:.2} seconds, {} frames per second", meta.name, meta.seconds, meta.fps))?;
     say(format_args!("base: {} Gaussians, {base_bytes} bytes\n", index.base_gaussians()))?;
     let names = ["segment", "from, s", "to, s", "frames", "bytes"];
     let mut table = Table::new(names.map(|name| (name.to_owned(), Align::Right)));

@@ -62,7 +62,7 @@ pub(super) fn resume_take(root: &Path, quiet: bool) -> Result<(), TrainError> {
 fn seconds_of(data: &Scene) -> Result<f64, TrainError> {
     data.seconds.ok_or_else(|| {
         TrainError::Input(format!(
-            "how long {} lasts is not known, so it cannot be divided into segments of seconds; give the frames a second: \
+            "how long {} lasts is not known, so it cannot be divided into segments of seconds; give the frames per second: \
              --set data.frames_a_second=30",
             data.root.display()
         ))
@@ -119,7 +119,7 @@ fn join(folder: &TakeFolder) -> Result<(), TrainError> {
     let trained = folder.trained();
     let frames: usize = trained.iter().map(|number| plan.segments[*number].frames).sum();
     say(format_args!(
-        "{}: {bytes} bytes, {} of {} segments, {:.2} kB a frame",
+        "{}: {bytes} bytes, {} of {} segments, {:.2} kB per frame",
         folder.file().display(),
         trained.len(),
         plan.segments.len(),
