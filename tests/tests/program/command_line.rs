@@ -229,6 +229,28 @@ fn wishes_become_keys() {
 }
 
 #[test]
+fn large_images_of_a_camera_that_jumps_are_trained_thoroughly() {
+    let w = Workspace::new(PROGRAM);
+    let frames = ["--train-frames", "4", "--test-frames", "1", "--val-frames", "1"];
+    assert_success(&w.command(["synth", "jumping", "--resolution", "400"]).args(frames).output().unwrap());
+    let train = |run: &str, wishes: &[&str]| {
+        let overrides =
+            ["train.coarse_iterations=1", "train.fine_iterations=1", "train.prune.iterations=[]", "device=flex"];
+        let overrides = overrides.iter().flat_map(|key| ["--set", key]);
+        let output = w.command(["train", "jumping", "--out", run]).args(overrides).args(wishes).output().unwrap();
+        assert_success(&output);
+        let configuration = fs::read_to_string(w.path(run).join("config.toml")).unwrap();
+        let told = String::from_utf8_lossy(&output.stderr).contains("dnerf+thorough");
+        assert_eq!(told, configuration.contains("smoothness = 3.0"), "{run}");
+        told
+    };
+    assert!(train("large", &["--pixels", "400"]));
+    // At 200 pixels, where the layout's preset trains; and by a preset that is named.
+    assert!(!train("small", &[]));
+    assert!(!train("named", &["--pixels", "400", "--config", "dnerf"]));
+}
+
+#[test]
 fn a_file_has_the_size_that_is_wished() {
     let w = Workspace::new(PROGRAM);
     let size = |name: &str| fs::metadata(w.path(name)).unwrap().len();
