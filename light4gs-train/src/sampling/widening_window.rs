@@ -1,6 +1,6 @@
 //! A window of time that widens: motion is followed outwards from where it is known.
 
-use light4gs_keys::Bounds::{Number, Whole};
+use light4gs_keys::Bounds::Whole;
 use light4gs_keys::{SHARE, keys};
 use rand::Rng;
 
@@ -26,9 +26,6 @@ keys! {
         newest: f64 = 0.3; SHARE, "ours";
         /// Number of times at each end of the window that count as the newest.
         newest_times: usize = 4; Whole { least: 1, most: 1_000_000 }, "ours";
-        /// The weight of the draws of the first and the last time, once the window holds all times; that of the middle is 1,
-        /// and the weights in between are linear. The ends came into the window last, and have neighbors on one side only.
-        end_weight: f64 = 1.0; Number { least: 1.0, most: 100.0 }, "ours";
     }
 }
 
@@ -63,23 +60,6 @@ impl WideningWindow {
         if first <= last { [first, last] } else { [last, last] }
     }
 
-    /// Whether an iteration belongs to the survey.
-    fn surveys(&self, request: &BatchRequest) -> bool {
-        request.stage == Stage::Fine && (request.iteration as f64) < self.survey * request.iterations as f64
-    }
-
-    /// One of all times, by its place, drawn with the weights of `end_weight`.
-    fn draw_of_all(&self, end: usize, random: &mut impl Rng) -> usize {
-        loop {
-            let place = random.random_range(0..=end);
-            let from_middle = (2.0 * place as f64 / end.max(1) as f64 - 1.0).abs();
-            let weight = 1.0 + (self.end_weight - 1.0) * from_middle;
-            if random.random::<f64>() * self.end_weight < weight {
-                return place;
-            }
-        }
-    }
-
     /// A time in a window, by its place, while the window widens.
     fn draw(&self, [first, last]: [usize; 2], end: usize, random: &mut impl Rng) -> usize {
         if random.random::<f64>() >= self.newest {
@@ -98,14 +78,12 @@ impl FrameSampler for WideningWindow {
     fn batch(&self, request: &BatchRequest) -> Vec<usize> {
         let times = &request.candidates.times;
         let (window, end) = (self.places(request), times.len() - 1);
-        let all = window == [0, end];
-        if all && (self.end_weight == 1.0 || self.surveys(request)) {
+        if window == [0, end] {
             return Shuffled {}.batch(request);
         }
         let random = &mut request.generator(request.iteration);
         let view = |_| {
-            let place = if all { self.draw_of_all(end, random) } else { self.draw(window, end, random) };
-            let frames = &times[place];
+            let frames = &times[self.draw(window, end, random)];
             frames[random.random_range(0..frames.len())]
         };
         (0..request.batch_size).map(view).collect()
@@ -166,43 +144,6 @@ mod tests {
         assert_eq!([found[2], found[3]], [[0.45, 0.55]; 2]);
         assert!(found[4][0] > 0.1 && found[4][0] < 0.4, "{:?}", found[4]);
         assert!(found[5][0] > 0.0 && found[6] == [0.0, 1.0], "{found:?}");
-    }
-
-    /// Twice as often at the ends as in the middle, once the window holds all times, and not before.
-    #[test]
-    fn ends_are_drawn_more_often() {
-        let camera = Camera::look_at([4.0, 0.0, 0.0].into(), [0.0; 3].into(), [0.0, 0.0, 1.0].into(), 0.7, 8, 8);
-        let frame = |k: usize| Frame::without_image(format!("{k}"), camera, k as f32 / 40.0);
-        let frames: Vec<Frame> = (0..41).map(frame).collect();
-        let candidates = &CandidateFrames::new(&frames);
-        let sampler = WideningWindow { end_weight: 2.0, survey: 0.25, ..WideningWindow::default() };
-        let share_at_ends = |iterations: std::ops::Range<usize>| {
-            let (mut ends, mut middle) = (0, 0);
-            for iteration in iterations {
-                let request = BatchRequest {
-                    frames: &frames,
-                    candidates,
-                    batch_size: 20,
-                    stage: Stage::Fine,
-                    iteration,
-                    iterations: 1000,
-                    seed: 1,
-                };
-                for at in sampler.batch(&request) {
-                    match at {
-                        0..=4 | 36..=40 => ends += 1,
-                        16..=25 => middle += 1,
-                        _ => {}
-                    }
-                }
-            }
-            f64::from(ends) / f64::from(middle)
-        };
-        let after = share_at_ends(800..1000);
-        // Mean weights of the ten places each: 1.9 and 1.125.
-        assert!((after - 1.9 / 1.125).abs() < 0.15, "{after}");
-        let survey = share_at_ends(1..200);
-        assert!((survey - 1.0).abs() < 0.15, "{survey}");
     }
 
     /// A window that is held for longer than it is closed opens when it has to, and not before.
