@@ -103,7 +103,7 @@ pub fn evaluate_take(
         let shown = Shown {
             frame,
             segment,
-            render: render(take, frame, at, data.background)?,
+            render: render_take(take, frame, data.background)?,
             truth: images.image(frame)?.as_ref().clone(),
         };
         let follows = before.as_ref().filter(|before| before.is_followed_by(frame, interval / seconds));
@@ -176,7 +176,12 @@ fn frames(data: &Scene) -> Vec<(Split, &Frame)> {
     frames
 }
 
-fn render(take: &PlayableTake, frame: &Frame, seconds: f64, background: [f32; 3]) -> Result<RgbImage8, TrainError> {
+/// The image of a take from a frame's camera. The frame's time is a share of the take.
+///
+/// # Errors
+/// [`TrainError::Codec`] for a damaged segment.
+pub fn render_take(take: &PlayableTake, frame: &Frame, background: [f32; 3]) -> Result<RgbImage8, TrainError> {
+    let seconds = f64::from(frame.time) * take.take().index().meta().seconds;
     let pixels = take.render(&frame.camera, seconds, background)?;
     Ok(RgbImage32 { width: frame.camera.width, height: frame.camera.height, pixels }.to_u8())
 }

@@ -71,6 +71,18 @@ fn a_take_is_trained_in_parts_and_plays_as_one_file() {
     assert_eq!(crossing, 2);
     assert!(scores["flicker"]["at_joins"].as_f64().unwrap() > 0.0);
     assert!(fs::read_to_string(w.path("take/report.html")).unwrap().contains("Flicker"));
+
+    // Frames of the test camera, as `eval` draws them.
+    let render =
+        |more: &[&str]| w.command(["render", "take/take.l4gs", "--out", "frames"]).args(more).output().unwrap();
+    assert_refused(&render(&["--device", "wgpu"]), &["--device wgpu", "take", "leave out --device"]);
+    assert_success(&render(&["--scene", "rig"]));
+    let frames = w.names("frames");
+    assert_eq!(frames.len(), 30, "{frames:?}");
+    assert_ne!(
+        fs::read(w.path("frames").join(&frames[0])).unwrap(),
+        fs::read(w.path("frames").join(&frames[29])).unwrap()
+    );
 }
 
 #[test]

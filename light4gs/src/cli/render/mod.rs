@@ -1,15 +1,16 @@
 //! `render`.
 
+mod source;
+
 use std::path::PathBuf;
 
 use clap::{Args, ValueEnum};
 use light4gs_codec::SceneMeta;
 use light4gs_data::{Camera, Frame, LoadOptions, Resolution, Scene, orbit_path};
 use light4gs_train::config::DeviceName;
-use light4gs_train::device;
 use light4gs_train::error::TrainError;
-use light4gs_train::evaluation::DecodedScene;
 
+use self::source::Source;
 use super::check_output;
 use super::limits::LimitsArgument;
 use super::limits::most::{MOST_FRAMES, MOST_SIDE, image_size};
@@ -31,7 +32,7 @@ enum Path {
 
 #[derive(Debug, Args)]
 pub(super) struct Render {
-    /// The .l4gs file.
+    /// The .l4gs file, of a clip or of a take.
     file: PathBuf,
     /// A file that ends in .gif or .mp4 (needs the program ffmpeg), or a folder for PNG frames.
     #[arg(long)]
@@ -61,7 +62,7 @@ pub(super) struct Render {
     #[arg(long, default_value_t = 20.0, allow_negative_numbers = true)]
     fps: f32,
     /// Back end: auto (a graphics card if there is one), flex or ndarray (both on the processor), wgpu, or wgpu with an adapter
-    /// such as wgpu:0.
+    /// such as wgpu:0. Takes are drawn on the processor.
     #[arg(long, default_value_t)]
     device: DeviceName,
     #[command(flatten)]
@@ -80,10 +81,9 @@ impl Render {
             return Err(TrainError::Input(format!("--elevation must be -90 to 90 degrees, not {}", self.elevation)));
         }
         check_output(&self.out, &self.file)?;
-        let decoded: DecodedScene =
-            DecodedScene::open_with_limits(&self.file, &self.limits.get(), &device::open(self.device)?)?;
-        let frames = self.camera_frames(&decoded.data.meta)?;
-        let images = frames.iter().map(|frame| Ok::<_, TrainError>(decoded.render(frame).to_u8()));
+        let source = Source::open(&self.file, &self.limits.get(), self.device)?;
+        let frames = self.camera_frames(source.meta())?;
+        let images = frames.iter().map(|frame| source.render(frame));
         let has_extension = |name: &str| self.out.extension().is_some_and(|e| e.eq_ignore_ascii_case(name));
         if has_extension("gif") || has_extension("mp4") {
             let count = match has_extension("gif") {
