@@ -120,6 +120,7 @@ export class Player extends EventTarget {
     canvas.addEventListener("webglcontextlost", this.#lost);
     canvas.addEventListener("webglcontextrestored", this.#restored);
     scene.addEventListener("change", this.#more);
+    scene.addEventListener("segment", this.#again);
   }
 
   /** More Gaussians of the scene have come, or a take has grown. */
@@ -131,6 +132,11 @@ export class Player extends EventTarget {
     this.#duration = duration;
     // With more Gaussians there are more levels, and other times.
     this.#draft = new Draft(this.scene.info.levels);
+  };
+
+  /** A segment of a take is there now. At rest in a fade, the image lacks it. */
+  #again = () => {
+    if (!this.#playing) this.#shownTime = -1;
   };
 
   #lost = (/** @type {Event} */ event) => event.preventDefault();
@@ -495,6 +501,7 @@ export class Player extends EventTarget {
     for (const observer of this.#observers) observer.disconnect();
     this.controls?.dispose();
     this.scene.removeEventListener("change", this.#more);
+    this.scene.removeEventListener("segment", this.#again);
     this.canvas.removeEventListener("webglcontextlost", this.#lost);
     this.canvas.removeEventListener("webglcontextrestored", this.#restored);
     this.renderer.dispose();

@@ -20,7 +20,7 @@ use light4gs_train::evaluation::section_sizes;
 use light4gs_train::import::scene_around;
 use light4gs_train::run::Checkpoint;
 use light4gs_train::run::RunFolder;
-use light4gs_train::take::backdrop_of;
+use light4gs_train::take::{TakeFolder, backdrop_of};
 use safetensors::Dtype;
 use safetensors::tensor::TensorView;
 use serde_json::json;
@@ -71,6 +71,13 @@ pub(super) struct Encode {
 impl Encode {
     pub(super) fn run(self) -> Result<(), TrainError> {
         check_output(&self.out, &self.run)?;
+        if TakeFolder::is_one(&self.run) {
+            let take = self.run.display();
+            return Err(TrainError::Input(format!(
+                "{take} is the folder of a take: give the run of a segment, such as {take}/segments/0000; `light4gs join {take}` joins \
+                 the files scene.l4gs of all segments"
+            )));
+        }
         let (mut folder, record, config) = RunFolder::open(&self.run)?;
         if is_inside(&self.out, folder.root()) {
             folder.lock()?;
@@ -279,6 +286,13 @@ pub(super) struct Decode {
 impl Decode {
     pub(super) fn run(self) -> Result<(), TrainError> {
         check_output(&self.out, &self.file)?;
+        if is_take_file(&self.file) {
+            let file = self.file.display();
+            return Err(TrainError::Input(format!(
+                "{file} is a take, whose arrays differ from segment to segment: decode the file of a segment \
+                 (segments/0000/scene.l4gs in the folder of the take), or write frames with `light4gs export {file} --out FOLDER`"
+            )));
+        }
         let data = read_file_with_limits(&self.file, &self.limits.get())?;
         let tensors = plain_tensors(&data);
         let views = tensors.iter().map(|(name, (shape, bytes))| {

@@ -72,6 +72,14 @@ fn a_take_is_trained_in_parts_and_plays_as_one_file() {
     assert!(scores["flicker"]["at_joins"].as_f64().unwrap() > 0.0);
     assert!(fs::read_to_string(w.path("take/report.html")).unwrap().contains("Flicker"));
 
+    // What is for one clip names what a take has in its place.
+    let clip_only = |arguments: &[&str]| w.command(arguments.iter().copied()).output().unwrap();
+    assert_refused(
+        &clip_only(&["decode", "take/take.l4gs", "--out", "x"]),
+        &["take", "segments/0000", "light4gs export"],
+    );
+    assert_refused(&clip_only(&["encode", "take", "--out", "x.l4gs"]), &["segments/0000", "light4gs join"]);
+
     // Frames of the test camera, as `eval` draws them.
     let render =
         |more: &[&str]| w.command(["render", "take/take.l4gs", "--out", "frames"]).args(more).output().unwrap();

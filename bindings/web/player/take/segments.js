@@ -195,6 +195,7 @@ export class Segments {
     this.#forgetOthers();
     const { count, levels } = await this.#connection.ask({ type: "segment", begin, unpacked }, [unpacked.buffer]);
     this.decoded.set(begin, { place, count, levels });
+    this.#take.dispatchEvent(new Event("segment"));
     this.#take.decodeMs = milliseconds;
   }
 
