@@ -55,11 +55,11 @@ choice! {
     pub enum ContextPart: "part" {
         /// A transmitted latent for planes that nothing else describes.
         Hyperprior = "hyperprior",
-        /// Anchors first, then the others with them as context.
+        /// Anchors are coded first, then the other positions with the anchors as context.
         Checkerboard = "checkerboard",
-        /// Space-only planes from space-time planes.
+        /// Space-only planes are predicted from space-time planes.
         InterPlane = "inter_plane",
-        /// Higher scales from the scale below.
+        /// Higher scales are predicted from the scale below.
         InterScale = "inter_scale",
         /// The reference's: a transmitted latent for higher scales too, with the inter-scale context beside it.
         HighScaleHyperprior = "high_scale_hyperprior",

@@ -12,7 +12,7 @@ keys! {
     pub struct AdaptiveQuantizationConfig {
         /// Quantization step of the space-only planes at the start.
         space_only: f64 = 0.05; QUANTIZATION_STEP, "ours; reference: 0.1, fixed";
-        /// The same for the space-time planes.
+        /// Quantization step of the space-time planes at the start.
         space_time: f64 = 0.05; QUANTIZATION_STEP, "ours; reference: 0.1, fixed";
     }
 }

@@ -10,11 +10,11 @@ use crate::planes::FeaturePlanes;
 keys! {
     /// Weights of the space-time regularizers, fine stage only.
     pub struct PlaneRegularizer {
-        /// Mean squared second difference of the space-only planes along their height.
+        /// Weight of the mean squared second difference of the space-only planes along their height.
         plane_smoothness: f32 = 1e-4; WEIGHT, "reference";
-        /// Mean squared second difference of the space-time planes along time.
+        /// Weight of the mean squared second difference of the space-time planes along time.
         time_smoothness: f32 = 1e-2; WEIGHT, "reference";
-        /// Mean distance of the space-time planes from 1, which means "no motion".
+        /// Weight of the mean distance of the space-time planes from 1, which means "no motion".
         time_l1: f32 = 1e-4; WEIGHT, "reference";
     }
 }

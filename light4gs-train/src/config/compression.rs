@@ -79,15 +79,17 @@ keys! {
         /// the planes are not trained for a low rate.
         planes: bool = true;
             Flag, "ours, for the ablation";
-        /// The same for the spherical harmonics.
+        /// The rate of the spherical harmonics has a gradient with respect to them. Off: their entropy model is
+        /// trained, but they are not trained for a low rate.
         sh: bool = true; Flag, "ours, for the ablation";
-        /// The other attributes of the Gaussians have noise, a rate and learned steps too, once densification is over.
-        /// Spherical harmonics of degree 1 or 2 are among them. Off: the encoder searches for their steps. Only the
-        /// `compact` profile quantizes them in the file; the `paper` profile quantizes only the spherical harmonics.
+        /// The attributes of the Gaussians that no other entropy model describes have noise, a rate and learned steps
+        /// too, once densification is over. In scenes of degree 1 or 2, spherical harmonics are among them. Off: the
+        /// encoder searches for their steps. Only the `compact` profile quantizes them in the file; the `paper` profile
+        /// quantizes only the spherical harmonics.
         attributes: bool = false; Flag, "ours, after HAC++";
-        /// Weight of a megabyte of these attributes in the loss.
+        /// Weight in the loss of a megabyte of the attributes that have a rate by `compression.rate.attributes`.
         attribute_lambda: f64 = 0.03; WEIGHT, "ours";
-        /// Every how many iterations the rate is part of the loss.
+        /// The rate is part of the loss once in this many iterations.
         interval: usize = 3; Whole { least: 1, most: 1000 }, "paper";
         /// Share of the planes, and of the Gaussians, on which the rate is estimated. The estimate is unbiased.
         fraction: f64 = 0.125; Number { least: 1e-6, most: 1.0 }, "ours";
@@ -119,7 +121,7 @@ keys! {
         model: ContextConfig;
         /// Learning rate of the context model at the first step.
         learning_rate_init: f64 = 5e-3; RATE, "ours";
-        /// The same at the end of the fine stage.
+        /// Learning rate of the context model at the end of the fine stage.
         learning_rate_final: f64 = 5e-4; RATE, "ours";
         /// Steps that fit entropy models to a scene that was trained without them.
         fit_iterations: usize = 1500; Whole { least: 1, most: 1_000_000 }, "ours";
@@ -137,7 +139,7 @@ keys! {
         adaptive: bool = true; Flag, "paper; dropped by the reference";
         /// Iteration of the fine stage from which the steps are learned.
         adaptive_from: usize = 15_000; ITERATION, "paper";
-        /// Learning rate of the logarithms of these steps, and of those of attributes.
+        /// Learning rate of the logarithms of steps: those of planes, and those of attributes.
         learning_rate: f64 = 2e-3; RATE, "ours";
         /// For a scene that was trained without a rate, such as an imported one: the encoder searches for the coarsest
         /// steps that cost at most this much PSNR, in dB. 0: the steps are used as they are.
@@ -151,11 +153,13 @@ keys! {
         /// The model and its step.
         #[serde(flatten)]
         entropy: ShConfig;
-        /// Learning rate of that model, and of the densities of other attributes, at the first step.
+        /// Learning rate of the entropy model of the spherical harmonics, and of the densities of other attributes, at
+        /// the first step.
         learning_rate_init: f64 = 5e-3; RATE, "ours";
-        /// The same at the end of the fine stage.
+        /// Learning rate of the entropy model of the spherical harmonics, and of the densities of other attributes, at the end
+        /// of the fine stage.
         learning_rate_final: f64 = 5e-4; RATE, "ours";
-        /// As `compression.steps.search_tolerance`, for this step.
+        /// As `compression.steps.search_tolerance`, but for the step `compression.sh.step`.
         search_tolerance: f64 = 0.0; DECIBELS, "ours";
     }
 }
@@ -163,10 +167,10 @@ keys! {
 keys! {
     /// Quantization of the attributes other than the spherical harmonics beyond degree 0.
     pub struct AttributesConfig {
-        /// Steps by the attributes' names, in the `compact` profile. That of `means` is a share of the typical Gaussian's
-        /// size, the others are in units of the trained numbers. Further attributes, such as `stillness` of control nodes
-        /// or one of a field of your own, can be named beside these; otherwise they have the steps that the field gives
-        /// them. The search starts from them.
+        /// Steps by the attributes' names, in the `compact` profile. That of `means` is a share of the typical
+        /// Gaussian's size, the others are in units of the trained numbers. Further attributes, such as `stillness` of
+        /// control nodes or one of a field of your own, can be named beside these; otherwise they have the steps that
+        /// the field gives them. The search of `compression.attributes.search_tolerance` starts from these steps.
         steps: ByName = built_in(step_of);
             Bounds::ByName(&QUANTIZATION_STEP), "ours";
         /// The encoder searches for the coarsest steps that cost at most this much PSNR on some training views, in dB.

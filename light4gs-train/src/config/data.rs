@@ -10,10 +10,10 @@ choice! {
     /// How times follow from the images' names, where the files give none.
     #[derive(Default)]
     pub enum TimesKind: "source of times" {
-        /// A date with a time of day, otherwise the last number, otherwise the order.
+        /// A date with a time of day in the images' names, otherwise the last number in them, otherwise their order.
         #[default]
         Auto = "auto",
-        /// The last number.
+        /// The last number in the images' names.
         Number = "number",
         /// The natural order of each camera's names, one step per name.
         Order = "order",
@@ -24,7 +24,8 @@ choice! {
     /// How cameras follow from the images' names, in layouts that do not name cameras.
     #[derive(Default)]
     pub enum CamerasKind: "source of cameras" {
-        /// One camera for each folder, and for each name without the part that counts the time.
+        /// Images are from the same camera if they are in the same folder and their names differ only in the part that
+        /// counts the time.
         #[default]
         Auto = "auto",
         /// There is one camera, which moves.
@@ -69,9 +70,11 @@ keys! {
         frames: Option<usize> = None;
             WholeOrNone { least: 1, most: 1_000_000 },
             "reference, Neu3D: 300";
-        /// Frames per second of the capture, by which its seconds are counted. Below 0.001: as its files say, where they do.
+        /// Frames per second of the capture; its length in seconds follows from them. Below 0.001: the rate that its
+        /// files state, if they state one.
         frames_a_second: f64 = 0.0; Number { least: 0.0, most: 1e5 }, "ours";
-        /// First and last time of the images that are used, as shares of the capture: of a take, those of a segment.
+        /// First and last time of the images that are used, as shares of the capture. In the run of a take's segment,
+        /// these are the times on which the segment is trained.
         between: [f64; 2] = [0.0, 1.0]; List { element: &SHARE, length: Some(2) }, "ours";
         /// At most this number of times is used, spread evenly. 0: all.
         #[serde(with = "optional")]
@@ -86,17 +89,18 @@ keys! {
         /// Where the times of images come from, in the layouts `colmap` and `nerfstudio`, if their files have none. `light4gs
         /// check` says what was read.
         times: TimesKind = TimesKind::Auto; TimesKind::BOUNDS, "ours";
-        /// How images are grouped into cameras, in the same layouts.
+        /// How images are grouped into cameras, in the layouts `colmap` and `nerfstudio`.
         cameras: CamerasKind = CamerasKind::Auto; CamerasKind::BOUNDS, "ours";
-        /// Whether cameras of a rig that are some frames ahead of the others, or behind, are moved in time. Without it,
-        /// `train` and `check` only say so.
+        /// Whether cameras of a rig that are some frames ahead of the others, or behind, are moved in time. Off:
+        /// `train` and `check` only report them.
         synchronize: bool = false; Flag, "ours";
         /// Upper bound of the memory for decoded images. Images that do not fit are decoded again, ahead of the
         /// iterations that need them.
         memory_limit_mib: u64 = 2048; Whole { least: 16, most: 1 << 24 }, "ours";
         /// Number of Gaussians at the start, where the dataset has no point cloud.
         initial_points: usize = 2000; Whole { least: 4, most: MOST_GAUSSIANS }, "reference, D-NeRF";
-        /// Half the side of the cube around the origin in which they are scattered, world units.
+        /// Half the side of the cube around the origin in which the initial Gaussians are scattered, if the dataset has
+        /// no point cloud; world units.
         initial_box: f32 = 1.3; Number { least: 1e-6, most: 1e6 }, "reference, D-NeRF";
     }
 }

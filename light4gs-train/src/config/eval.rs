@@ -14,13 +14,13 @@ keys! {
             List { element: &EvalSplit::BOUNDS, length: None }, "ours";
         /// Save every rendered view as a PNG in `renders/`.
         save_renders: bool = true; Flag, "ours";
-        /// Frames rendered before the clock starts.
+        /// Frames that are rendered before the measurement of the frame rate begins.
         fps_warmup: usize = 5; Whole { least: 0, most: 1_000_000 }, "ours";
         /// Frames over which the frame rate is measured.
         fps_frames: usize = 50; Whole { least: 1, most: 1_000_000 }, "ours";
         /// Iterations between two measurements of test PSNR during training. 0: never measured.
         interval: usize = 1000; ITERATION, "ours";
-        /// Test views for that measurement.
+        /// Number of test views for the measurements of PSNR during training.
         views: usize = 4; ITERATION, "ours";
         /// Files with the weights of LPIPS ([metrics.md](metrics.md)). Without them LPIPS is not measured, and its
         /// columns say so.

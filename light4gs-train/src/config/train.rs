@@ -116,29 +116,30 @@ keys! {
     /// Adam's rates. A pair of `init` and `final` decays exponentially; those of positions, deformation and feature planes are
     /// multiplied by the scene's extent.
     pub struct LearningRates {
-        /// Deformation network, first step.
+        /// Learning rate of the deformation network at the first step.
         deformation_init: f64 = 1.6e-4; RATE, "reference";
-        /// Deformation network, end of the schedule.
+        /// Learning rate of the deformation network at the end of the schedule.
         deformation_final: f64 = 1.6e-5; RATE, "reference";
-        /// Feature planes, first step.
+        /// Learning rate of the feature planes at the first step.
         planes_init: f64 = 1.6e-3; RATE, "reference";
-        /// Feature planes, end of the schedule.
+        /// Learning rate of the feature planes at the end of the schedule.
         planes_final: f64 = 1.6e-4; RATE, "reference";
-        /// Attributes of the Gaussians, first step. Further attributes, such as `stillness` of control nodes or one of a
-        /// field of your own, can be named beside these; otherwise they have the rates that the field gives them.
+        /// Learning rates of the Gaussians' attributes at the first step. Further attributes, such as `stillness` of
+        /// control nodes or one of a field of your own, can be named beside these; otherwise they have the rates that
+        /// the field gives them.
         attributes_init: ByName = built_in(|attribute| Some(attribute.learning_rate.initial));
             Bounds::ByName(&RATE), "3DGS";
-        /// The same at the end of the schedule. An attribute that is not named here keeps its rate, unless its field gives
-        /// it another one.
+        /// Learning rates of the Gaussians' attributes at the end of the schedule. An attribute that is not named here
+        /// keeps its rate, unless its field gives it another one.
         attributes_final: ByName = built_in(|attribute| attribute.learning_rate.last);
             Bounds::ByName(&RATE), "3DGS";
         /// Length of the decay in iterations. 0: the length of the stage.
         #[serde(with = "optional")]
         schedule_steps: Option<usize> = None; ITERATION, "ours; reference: 20000";
-        /// Share of the fine stage, at its end, in which these rates fall once more, so that the noise of the steps is averaged
-        /// away once motion has been found. 0: none.
+        /// Share of the fine stage, at its end, in which the rates of this table fall once more, so that the noise of
+        /// the steps is averaged away once motion has been found. 0: none.
         cooldown: f64 = 0.0; SHARE, "ours; the last phase of warmup-stable-decay (Hu et al. 2024)";
-        /// Factor by which they have fallen at its end.
+        /// Factor by which the rates have fallen at the end of the cooldown.
         cooldown_factor: f64 = 0.1; Number { least: 1e-6, most: 1.0 }, "ours";
     }
 }

@@ -48,10 +48,12 @@ const CORRECTION_RATE: light4gs_keys::Bounds = Number { least: 1e-20, most: 0.1 
 keys! {
     /// What is corrected.
     pub struct CorrectionsConfig {
-        /// Unit with a learned gain and offset of each color channel. They are not in the file.
+        /// Whether each camera or each frame gets a gain and an offset of its own for each color channel. They are
+        /// learned, and are not in the file.
         exposure: CorrectionUnit = CorrectionUnit::None; CorrectionUnit::BOUNDS, "ours";
-        /// Unit with a learned small rotation and translation. `"camera"` is for rigs that stand still. With `"frame"`, a camera
-        /// that stands still has one for all of its frames.
+        /// Whether each camera or each frame gets a small rotation and translation of its own, which are learned.
+        /// `"camera"` is for rigs that stand still. With `"frame"`, a camera that stands still gets one correction for
+        /// all of its frames.
         poses: CorrectionUnit = CorrectionUnit::None; CorrectionUnit::BOUNDS, "ours";
         /// The times of each camera of a rig are corrected by an offset.
         time_offsets: bool = false; Flag, "ours";
@@ -61,29 +63,30 @@ keys! {
 }
 
 keys! {
-    /// How corrections of exposures, poses and times are learned. The rates are Adam's at the beginning and at the end of a run
-    /// that looks at each frame or camera a hundred times; with fewer looks they are larger in proportion, up to three times,
-    /// and with more they are smaller, down to a fifth.
+    /// How corrections of exposures, poses and times are learned. The rates are Adam's, at the beginning and at the end
+    /// of a run, for a run that looks at each frame or camera a hundred times. If it looks less often, the rates are
+    /// larger in proportion, at most three times; if more often, smaller, at least a fifth.
     pub struct CorrectionRates {
         /// Poses and times are corrected from this iteration on, counted over both stages: before, there is no scene to compare with.
         from: usize = 300; ITERATION, "ours";
-        /// Exposures, first step: logarithms of gains, and, a quarter of it, offsets in shares of white.
+        /// Learning rate of exposures at the first step: of the logarithms of gains. Offsets, in shares of white, have
+        /// a quarter of it.
         exposure_init: f64 = 2e-2; CORRECTION_RATE, "ours";
-        /// Exposures, end of the run.
+        /// Learning rate of exposures at the end of the run.
         exposure_final: f64 = 2e-4; CORRECTION_RATE, "ours";
-        /// Weight of the squares of the logarithms of gains, and of offsets.
+        /// Weight in the loss of the squares of exposures: of the logarithms of gains, and of offsets.
         exposure_weight: f32 = 0.02; WEIGHT, "ours";
-        /// Turns of cameras, first step, radians.
+        /// Learning rate of the rotations of cameras at the first step, in radians.
         turn_init: f64 = 1e-3; CORRECTION_RATE, "ours";
-        /// Turns, end of the run.
+        /// Learning rate of the rotations of cameras at the end of the run, in radians.
         turn_final: f64 = 1e-5; CORRECTION_RATE, "ours";
-        /// Translations of cameras, first step, as shares of the scene's extent.
+        /// Learning rate of the translations of cameras at the first step, in shares of the scene's extent.
         translation_init: f64 = 5e-4; CORRECTION_RATE, "ours";
-        /// Translations, end of the run.
+        /// Learning rate of the translations of cameras at the end of the run, in shares of the scene's extent.
         translation_final: f64 = 5e-6; CORRECTION_RATE, "ours";
-        /// Offsets of times, first step, in intervals between two frames.
+        /// Learning rate of the offsets of times at the first step, in intervals between two frames.
         time_init: f64 = 4e-2; CORRECTION_RATE, "ours";
-        /// Offsets of times, end of the run.
+        /// Learning rate of the offsets of times at the end of the run, in intervals between two frames.
         time_final: f64 = 4e-4; CORRECTION_RATE, "ours";
     }
 }

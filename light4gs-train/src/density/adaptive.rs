@@ -31,27 +31,29 @@ keys! {
         until: usize = 15_000; ITERATION, "reference; the paper says 14000";
         /// Iterations between two rounds of cloning and splitting.
         interval: usize = 100; INTERVAL, "reference";
-        /// Screen-space gradient (in half-image units) above which a Gaussian is cloned or split, coarse stage.
+        /// Screen-space gradient (in half-image units) above which a Gaussian is cloned or split in the coarse stage.
         grad_threshold_coarse: f32 = 2e-4; THRESHOLD, "3DGS";
-        /// The same at the start of the fine stage.
+        /// Screen-space gradient above which a Gaussian is cloned or split, at the start of the fine stage.
         grad_threshold_fine_init: f32 = 2e-4; THRESHOLD, "reference";
-        /// The same at `until`; linear between the two.
+        /// Screen-space gradient above which a Gaussian is cloned or split, at the iteration `until` of the fine stage;
+        /// it changes linearly from `grad_threshold_fine_init`.
         grad_threshold_fine_final: f32 = 2e-4; THRESHOLD, "reference";
         /// Gaussians up to this share of the scene's extent are cloned, larger ones split in two.
         percent_dense: f32 = 0.01; Number { least: 1e-9, most: 1e9 }, "3DGS";
         /// Largest number of Gaussians. At this bound, those with the largest gradients are cloned or split first.
         max_gaussians: usize = 360_000; Whole { least: 1, most: MOST_GAUSSIANS }, "reference; the largest first: ours";
-        /// Opacity below which a Gaussian is removed, coarse stage.
+        /// Opacity below which a Gaussian counts as faint and is removed, in the coarse stage.
         opacity_threshold: f32 = 0.005; SHARE, "3DGS";
-        /// The same at the start of the fine stage.
+        /// Opacity below which a Gaussian counts as faint and is removed, at the start of the fine stage.
         opacity_threshold_fine_init: f32 = 0.005; SHARE, "reference";
-        /// The same at `until`; linear between the two.
+        /// Opacity below which a Gaussian counts as faint and is removed, at the iteration `until` of the fine stage;
+        /// it changes linearly from `opacity_threshold_fine_init`.
         opacity_threshold_fine_final: f32 = 0.005; SHARE, "reference";
-        /// Pruning starts after this iteration.
+        /// The removal of faint Gaussians starts after this iteration.
         prune_from: usize = 500; ITERATION, "reference";
-        /// Iterations between two rounds of pruning.
+        /// Iterations between two removals of faint Gaussians.
         prune_interval: usize = 100; INTERVAL, "reference";
-        /// Gaussians are pruned by opacity only while there are more than this. While there are fewer, fast objects
+        /// Faint Gaussians are removed only if there are more Gaussians than this. While there are fewer, fast objects
         /// survive the coarse stage, where they are faint. 0: always.
         prune_above: usize = 200_000;
             ITERATION, "reference: 200000";

@@ -14,7 +14,7 @@ keys! {
         /// New Gaussians for each training time, at pixels of one of its frames; fewer where few pixels are unexplained.
         /// They may exceed `train.densify.adaptive.max_gaussians`.
         count: usize = 100; Whole { least: 1, most: 1_000_000 }, "ours";
-        /// Their lifetime: its standard deviation in distances between training times.
+        /// Lifetime of the new Gaussians: its standard deviation, in distances between training times.
         lifetime: f64 = 0.6; Number { least: 0.01, most: 1e6 }, "ours";
     }
 }

@@ -20,10 +20,10 @@ keys! {
         /// What a pixel adds to the score of each Gaussian that it blends.
         score: PruneScore = PruneScore::Transmittance;
             PruneScore::BOUNDS, "paper; the reference sums the opacity";
-        /// Factor of the volume V.
+        /// Factor of a Gaussian's score that follows from its volume V.
         volume: PruneVolume = PruneVolume::Clamped;
             PruneVolume::BOUNDS, "paper";
-        /// Exponent of that factor.
+        /// Exponent in the factor of `train.prune.volume`.
         volume_exponent: f64 = 0.1; Number { least: 1e-6, most: 3.0 }, "LightGaussian";
         /// A pass uses one random camera for each time instead of every training view; for data with many cameras.
         one_camera_per_time: bool = false; Flag, "paper, multi-view data";

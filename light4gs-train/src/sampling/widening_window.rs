@@ -14,13 +14,13 @@ keys! {
     pub struct WideningWindow {
         /// Length of the survey, as a share of the fine stage: frames of all times are drawn before the first window begins.
         survey: f64 = 0.0; SHARE, "ours";
-        /// The middle of the first window.
+        /// The middle of the first window, as a share of all times.
         center: f64 = 0.5; SHARE, "ours";
-        /// Different times in the first window.
+        /// Number of different times in the first window.
         times: usize = 12; Whole { least: 1, most: 1_000_000 }, "ours";
-        /// The share of the rest for which the first window stays.
+        /// The first window stays for this share of the fine stage's iterations after the survey.
         held: f64 = 0.07; SHARE, "ours";
-        /// The share of the rest after which all times are seen.
+        /// All times are seen after this share of the fine stage's iterations after the survey.
         open: f64 = 0.6; SHARE, "ours";
         /// The share of the draws that go to the newest times while the window widens.
         newest: f64 = 0.3; SHARE, "ours";

@@ -28,7 +28,7 @@ const SHEET_SIDE: u32 = 192;
 pub(super) struct Check {
     /// Folder of the dataset.
     scene: PathBuf,
-    /// Layout of the dataset; without it, it is found by content (see docs/data.md).
+    /// Layout of the dataset; if this option is not given, the layout is found by content (see docs/data.md).
     #[arg(long, value_name = "NAME", value_parser = PossibleValuesParser::new(Layouts::default().names()))]
     format: Option<String>,
     /// Changes one key of the configuration, such as data.times=order; may be given more than once.

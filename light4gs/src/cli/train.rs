@@ -56,7 +56,7 @@ pub(super) struct Train {
     /// trains control nodes. paper-dnerf+paper-coding trains the paper's hexplane with the paper's protocol.
     #[arg(long, value_name = "PRESET|FILE")]
     config: Option<String>,
-    /// Layout of the dataset; without it, it is found by content (see docs/data.md).
+    /// Layout of the dataset; if this option is not given, the layout is found by content (see docs/data.md).
     #[arg(long, value_name = "NAME", value_parser = PossibleValuesParser::new(Layouts::default().names()))]
     format: Option<String>,
     /// Folder of the run.
