@@ -462,7 +462,7 @@ export class Player extends EventTarget {
     return this.#draft.level;
   }
 
-  /** Images a second over the last second; 0 where nothing changes. */
+  /** Images per second over the last second; 0 where nothing changes. */
   get fps() {
     const times = this.#frameTimes;
     if (times.length < 2 || performance.now() - times[times.length - 1] > 500) return 0;

@@ -4,7 +4,7 @@ import assert from "node:assert/strict";
 import { test } from "node:test";
 import { scenePath } from "./harness.mjs";
 import { COLORS, WHITE, makeTake, partsOf } from "./take_harness.mjs";
-import { long, ranges, serveTake, take, takePage, view, wait } from "./take_page.mjs";
+import { files, long, ranges, serveTake, take, takePage, view, wait } from "./take_page.mjs";
 
 /** The shown segment, one behind, two ahead. */
 const MOST_DECODED = 4;
@@ -142,6 +142,39 @@ test("joins are played without a pause and without an image that lacks Gaussians
   assert.ok(steps.every((step) => step >= 0 && step < 0.35), `steps of ${Math.max(...steps)} s`);
   assert.ok(most <= MOST_DECODED, `${most} segments were decoded`);
   assert.ok(served.requests.length <= 4);
+  assert.deepEqual(page.problems, []);
+  await page.context().close();
+});
+
+test("at rest in a fade, the image is drawn again when the other segment comes", async () => {
+  serveTake(take);
+  const [first] = partsOf(take).segments[2];
+  let release;
+  const released = new Promise((resolve) => (release = resolve));
+  const answer = files["take.l4gs"];
+  files["take.l4gs"] = async (response, request) => {
+    if (request.headers.range?.startsWith(`bytes=${first}-`)) await released;
+    return answer(response, request);
+  };
+  const page = await takePage();
+  await page.evaluate(async (view) => {
+    const player = await globalThis.play(await globalThis.load(), { controls: false });
+    player.camera.take(view);
+    player.cameraMoved();
+    const setList = player.renderer.setList.bind(player.renderer);
+    player.renderer.setList = (given) => ((globalThis.list = given.length / 16), setList(given));
+    globalThis.list = 0;
+    // The second segment goes over into the third.
+    player.time = 1.98 / player.scene.duration;
+  }, view);
+  const shown = () => page.evaluate(() => [globalThis.list, [...globalThis.player.scene.segments.decoded.keys()]]);
+  for (let i = 0; i < 50 && (await shown())[1].length < 2; i++) await wait(100);
+  await wait(500);
+  // Base and second segment have 161 Gaussians: one row of the list.
+  assert.deepEqual(await shown(), [256, [0, 1]]);
+  release();
+  for (let i = 0; i < 50 && (await shown())[0] < 512; i++) await wait(100);
+  assert.equal((await shown())[0], 512);
   assert.deepEqual(page.problems, []);
   await page.context().close();
 });

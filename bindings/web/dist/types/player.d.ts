@@ -111,7 +111,7 @@ export declare class Player extends EventTarget {
      * Gaussians, and half as many with each further one.
      */
     get draftLevel(): number;
-    /** Images a second over the last second; 0 where nothing changes. */
+    /** Images per second over the last second; 0 where nothing changes. */
     get fps(): number;
     /** Draws again, as after {@link background} was changed. */
     redraw(): void;

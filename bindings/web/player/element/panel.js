@@ -50,7 +50,7 @@ export function fillPanel(panel, player) {
     ]),
     body(info.sections.map(([name, bytes]) => [name.replaceAll("_", " "), size(bytes)])),
     body([
-      ["Images a second", player.fps > 0 ? player.fps.toFixed(0) : "–"],
+      ["Images per second", player.fps > 0 ? player.fps.toFixed(0) : "–"],
       ["Decoding", ms(decodeMs)],
       ["Motion, worker", ms(evaluate)],
       ["Order and colors, worker", ms(sort)],

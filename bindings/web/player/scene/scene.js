@@ -6,7 +6,7 @@
  * @typedef {object} SceneInfo  what a file says of itself
  * @property {string} name  for people
  * @property {number} frameCount  frames of the source
- * @property {number} fps  frames a second of the source, 0 where it is not known
+ * @property {number} fps  frames per second of the source, 0 where it is not known
  * @property {[number[], number[]]} bounds  smallest and largest corner, world units
  * @property {[number, number, number]} background  red, green, blue in [0, 1]
  * @property {number} width  of the source's default camera, pixels
@@ -72,7 +72,7 @@ export class Scene extends EventTarget {
     return this.info.count;
   }
 
-  /** Length in seconds: the source's where it is known, else at 30 frames a second. */
+  /** Length in seconds: the source's where it is known, else at 30 frames per second. */
   get duration() {
     return Math.max(this.info.frameCount, 1) / (this.info.fps || 30);
   }

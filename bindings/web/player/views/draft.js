@@ -7,7 +7,7 @@
 const LADDER = [[1, 0], [0.7, 0], [0.7, 1], [0.5, 1], [0.5, 2], [0.35, 2], [0.35, 3], [0.35, 4], [0.35, 5]];
 /** Milliseconds of an image: above, the next faster step; below, a slower one is tried after a while. */
 const [SLOW, FAST] = [28, 14];
-/** Replaces the first number where the next step would look worse than fewer images a second. */
+/** Replaces the first number where the next step would look worse than fewer images per second. */
 const VERY_SLOW = 45;
 /** The last step of the ladder that looks well. */
 const LAST_GOOD = LADDER.findIndex(([, level]) => level > 2) - 1;

@@ -9,7 +9,7 @@ export type SceneInfo = {
      */
     frameCount: number;
     /**
-     * frames a second of the source, 0 where it is not known
+     * frames per second of the source, 0 where it is not known
      */
     fps: number;
     /**
@@ -138,7 +138,7 @@ export type Frame = {
  * @typedef {object} SceneInfo  what a file says of itself
  * @property {string} name  for people
  * @property {number} frameCount  frames of the source
- * @property {number} fps  frames a second of the source, 0 where it is not known
+ * @property {number} fps  frames per second of the source, 0 where it is not known
  * @property {[number[], number[]]} bounds  smallest and largest corner, world units
  * @property {[number, number, number]} background  red, green, blue in [0, 1]
  * @property {number} width  of the source's default camera, pixels
@@ -194,7 +194,7 @@ export declare class Scene extends EventTarget {
     constructor(connection: Connection);
     /** Number of Gaussians. */
     get count(): number;
-    /** Length in seconds: the source's where it is known, else at 30 frames a second. */
+    /** Length in seconds: the source's where it is known, else at 30 frames per second. */
     get duration(): number;
     /**
      * The Gaussians at a time, activated, for a renderer of your own.
