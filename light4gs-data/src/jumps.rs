@@ -4,13 +4,18 @@ use glam::Vec3;
 
 use crate::frame::Frame;
 
-/// The median angle between the viewing directions of one frame and the next in time, degrees; 0 for fewer than two frames.
+/// The median angle between the viewing directions of one frame and the next in time, degrees; 0 for fewer than two frames,
+/// and for a rig, whose frames share their times.
 ///
 /// It is a few degrees for a video, and some 60 to 100 for the scenes of D-NeRF, each frame of which shows the scene from
 /// another side.
 pub fn turn_between_frames(frames: &[Frame]) -> f32 {
     let mut frames: Vec<&Frame> = frames.iter().collect();
     frames.sort_by(|a, b| a.time.total_cmp(&b.time));
+    let shared = frames.windows(2).filter(|pair| pair[0].time == pair[1].time).count();
+    if 4 * shared > frames.len() {
+        return 0.0;
+    }
     let directions: Vec<Vec3> = frames.iter().map(|frame| direction(frame)).collect();
     let mut angles: Vec<f32> = directions.windows(2).map(|pair| pair[0].angle_between(pair[1]).to_degrees()).collect();
     angles.sort_by(f32::total_cmp);
@@ -48,5 +53,7 @@ mod tests {
         }
         assert_eq!(turn_between_frames(&frames(5.0)[..1]), 0.0);
         assert_eq!(turn_between_frames(&[]), 0.0);
+        let rig = [frames(65.0), frames(65.0)].concat();
+        assert_eq!(turn_between_frames(&rig), 0.0);
     }
 }
