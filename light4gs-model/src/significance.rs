@@ -13,7 +13,7 @@ const VOLUME_QUANTILE: f64 = 0.9;
 /// The quantity that is summed over the pixels that blend a Gaussian.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum PixelContribution {
-    /// Transmittance before the Gaussian times its opacity: the paper's.
+    /// The transmittance in front of the Gaussian, multiplied by the Gaussian's opacity. This is the paper's score.
     TransmittanceOpacity,
     /// The blending weight, transmittance times alpha.
     BlendingWeight,

@@ -20,8 +20,8 @@ keys! {
         resolution: [usize; 4] = [64, 64, 64, 24];
             List { element: &Whole { least: 4, most: MOST_PLANE_RESOLUTION as u64 }, length: Some(4) },
             "paper; its 25 time steps are no multiple of 4";
-        /// One scale of planes for each number, ascending. The spatial resolution is the base resolution times the
-        /// number; the resolution in time stays the same.
+        /// Ascending numbers, one for each scale of planes. The spatial resolution of a scale is `resolution` times its
+        /// number; the resolution in time is the same at all scales.
         multipliers: Vec<usize> = vec![1, 2];
             List { element: &Whole { least: 1, most: MOST_PLANE_RESOLUTION as u64 / 4 }, length: None }, "paper";
     }

@@ -76,13 +76,13 @@ impl Pca {
 }
 
 keys! {
-    /// From world coordinates to those of the planes (paper III-A).
+    /// The mapping from world coordinates to the coordinates of the planes (paper III-A).
     pub struct CoordinatesConfig {
         /// The planes lie along the principal axes of the initial cloud. Off: along the world's axes, scaled by the
         /// cloud's standard deviation along each.
         pca: bool = true; Flag, "paper";
         /// Points more than one standard deviation away from the cloud's center are contracted. Off: the whole cloud is
-        /// scaled into the ball that contraction does not change, which is half as wide as the planes.
+        /// scaled into the ball that contraction would not change. This ball is half as wide as the planes.
         contraction: bool = true; Flag, "paper";
     }
 }

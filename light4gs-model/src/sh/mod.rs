@@ -119,7 +119,7 @@ macro_rules! built_in_models {
 }
 
 built_in_models! {
-    /// One learned density for each channel: the paper's choice.
+    /// One learned density for each channel, as in the paper.
     Factorized = "factorized": ShBottleneck, ShBottleneckConfig:
         |step, _| ShBottleneckConfig::new().with_step(step).with_initial_scale(SH_INITIAL_SCALE);
     /// A mixture of logistics for each channel.
@@ -127,7 +127,7 @@ built_in_models! {
     /// Every degree is predicted from those below it.
     Autoregressive = "channel_autoregressive": ShAutoregressive, ShAutoregressiveConfig:
         |step, _| ShAutoregressiveConfig::new().with_step(step);
-    /// The parameters follow from the space-only planes at the Gaussian's position.
+    /// The parameters of the distributions follow from the space-only planes at the Gaussian's position.
     HexPlaneCoupled = "hexplane_coupled": ShHexPlaneCoupled, ShHexPlaneCoupledConfig:
         |step, feature_size| ShHexPlaneCoupledConfig::new(feature_size).with_step(step);
 }
@@ -142,9 +142,10 @@ impl ShKind {
 keys! {
     /// The model of the spherical harmonics beyond degree 0.
     pub struct ShConfig {
-        /// Entropy model of the spherical harmonics beyond degree 0. It is trained for degree 3. Scenes of a lower degree
-        /// have none. In the `compact` profile the file does not use `"factorized"` and `"mixture_of_logistics"`, whose
-        /// densities are the same for all Gaussians: prediction from neighbors saves more.
+        /// Entropy model of the spherical harmonics beyond degree 0. It is trained for degree 3. Scenes of a lower
+        /// degree have none. The densities of `"factorized"` and `"mixture_of_logistics"` are the same for all
+        /// Gaussians. In the `compact` profile the file does not use these two, because prediction from neighbors saves
+        /// more.
         model: ShKind = ShKind::Factorized; ShKind::BOUNDS, "paper";
         /// Quantization step of the spherical harmonics beyond degree 0.
         step: f64 = 0.02; QUANTIZATION_STEP, "paper";

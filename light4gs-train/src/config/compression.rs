@@ -19,12 +19,13 @@ keys! {
         /// Upper bound of the file in bytes; the file uses nearly all of it. Training adapts the weight of the rate, and the
         /// encoder adapts the steps of the attributes. 0: no bound; the size follows from lambda and the steps.
         target_bytes: usize = 0; Whole { least: 0, most: 1_000_000_000_000 }, "ours";
-        /// Lower bound of the PSNR of the decoded file on the test views (on the training views if there are none), in dB. The
-        /// file is hardly better: weight and steps are adapted as with `target_bytes`. 0: no bound.
+        /// Lower bound of the PSNR of the decoded file on the test views (on the training views if there are none), in
+        /// dB. The file is hardly better, since the weight of the rate and the steps are adapted as with
+        /// `target_bytes`. 0: no bound.
         target_db: f64 = 0.0; DECIBELS, "ours";
-        /// Layers of Gaussians in the file, the most significant ones first: with more than 1 a player shows a coarse scene
-        /// after the first few bytes. Each layer has twice as many as the one before. More layers take some percent more
-        /// bytes; the profile `float32` has only one.
+        /// Layers of Gaussians in the file, the most significant ones first: with more than 1 a player shows a coarse
+        /// scene after the first few bytes. Each layer has twice as many Gaussians as the one before. More layers take
+        /// some percent more bytes. A file of the profile `float32` has only one layer.
         layers: usize = GaussianLayers::default().count as usize;
             Whole { least: 1, most: GaussianLayers::MOST as u64 }, "ours";
         /// The rate in the loss.
@@ -68,8 +69,8 @@ impl FileProfile {
 keys! {
     /// The rate term of the loss.
     pub struct RateConfig {
-        /// Weight of the rate in the loss. 0: the scene is trained without it, and the entropy models are fitted to
-        /// the finished scene.
+        /// Weight of the rate in the loss. 0: the scene is trained without the rate, and the entropy models are fitted
+        /// to the finished scene.
         lambda: f64 = 0.0;
             WEIGHT, "ours; the reference's log of *bouncing balls* has 0.001 per symbol";
         /// The unit of the rate that lambda multiplies.
@@ -79,25 +80,25 @@ keys! {
         /// the planes are not trained for a low rate.
         planes: bool = true;
             Flag, "ours, for the ablation";
-        /// The rate of the spherical harmonics has a gradient with respect to them. Off: their entropy model is
-        /// trained, but they are not trained for a low rate.
+        /// The rate of the spherical harmonics has a gradient with respect to the harmonics. Off: their entropy model
+        /// is trained, but the harmonics are not trained for a low rate.
         sh: bool = true; Flag, "ours, for the ablation";
-        /// The attributes of the Gaussians that no other entropy model describes have noise, a rate and learned steps
-        /// too, once densification is over. In scenes of degree 1 or 2, spherical harmonics are among them. Off: the
-        /// encoder searches for their steps. Only the `compact` profile quantizes them in the file; the `paper` profile
-        /// quantizes only the spherical harmonics.
+        /// Once densification is over, those attributes that no other entropy model describes have quantization noise,
+        /// a rate and learned steps too. In scenes of degree 1 or 2, spherical harmonics are among these attributes.
+        /// Off: the encoder searches for the steps of these attributes. Only the `compact` profile quantizes all of
+        /// them in the file; the `paper` profile quantizes only the spherical harmonics.
         attributes: bool = false; Flag, "ours, after HAC++";
-        /// Weight in the loss of a megabyte of the attributes that have a rate by `compression.rate.attributes`.
+        /// Weight, in the loss, of a megabyte of those attributes to which `compression.rate.attributes` gives a rate.
         attribute_lambda: f64 = 0.03; WEIGHT, "ours";
         /// The rate is part of the loss once in this many iterations.
         interval: usize = 3; Whole { least: 1, most: 1000 }, "paper";
         /// Share of the planes, and of the Gaussians, on which the rate is estimated. The estimate is unbiased.
         fraction: f64 = 0.125; Number { least: 1e-6, most: 1.0 }, "ours";
-        /// Iteration of the fine stage from which the planes have quantization noise and the rate is part of the loss.
-        /// Spherical harmonics follow when densification is over.
+        /// From this iteration of the fine stage on, the planes have quantization noise and the rate is part of the
+        /// loss. Spherical harmonics follow when densification is over.
         from: usize = 1000; ITERATION, "reference: 3; SH 2000";
         /// Iteration of the fine stage after which the planes are frozen: they take the values that the file will have,
-        /// and only the rest of the scene is trained on. 0: never.
+        /// and only the rest of the scene is still trained. 0: never.
         planes_until: usize = 27_000;
             ITERATION, "ours";
     }
@@ -139,7 +140,7 @@ keys! {
         adaptive: bool = true; Flag, "paper; dropped by the reference";
         /// Iteration of the fine stage from which the steps are learned.
         adaptive_from: usize = 15_000; ITERATION, "paper";
-        /// Learning rate of the logarithms of steps: those of planes, and those of attributes.
+        /// Learning rate of the logarithms of steps, for the steps of planes and of attributes.
         learning_rate: f64 = 2e-3; RATE, "ours";
         /// For a scene that was trained without a rate, such as an imported one: the encoder searches for the coarsest
         /// steps that cost at most this much PSNR, in dB. 0: the steps are used as they are.
@@ -167,10 +168,11 @@ keys! {
 keys! {
     /// Quantization of the attributes other than the spherical harmonics beyond degree 0.
     pub struct AttributesConfig {
-        /// Steps by the attributes' names, in the `compact` profile. That of `means` is a share of the typical
-        /// Gaussian's size, the others are in units of the trained numbers. Further attributes, such as `stillness` of
-        /// control nodes or one of a field of your own, can be named beside these; otherwise they have the steps that
-        /// the field gives them. The search of `compression.attributes.search_tolerance` starts from these steps.
+        /// Steps by the attributes' names, in the `compact` profile. The step of `means` is a share of the typical
+        /// Gaussian's size; other steps are in units of the trained numbers. Further attributes, such as `stillness` of
+        /// control nodes or one of a field of your own, can be named as well. If such an attribute is not named, it has
+        /// the step that the field gives it. The search of `compression.attributes.search_tolerance` starts from these
+        /// steps.
         steps: ByName = built_in(step_of);
             Bounds::ByName(&QUANTIZATION_STEP), "ours";
         /// The encoder searches for the coarsest steps that cost at most this much PSNR on some training views, in dB.

@@ -10,7 +10,8 @@ choice! {
     /// How times follow from the images' names, where the files give none.
     #[derive(Default)]
     pub enum TimesKind: "source of times" {
-        /// A date with a time of day in the images' names, otherwise the last number in them, otherwise their order.
+        /// A date with a time of day in the images' names, otherwise the last number in the names, otherwise the order
+        /// of the names.
         #[default]
         Auto = "auto",
         /// The last number in the images' names.
@@ -58,8 +59,8 @@ impl From<CamerasKind> for CamerasFrom {
 keys! {
     /// Images, and the cloud that training starts from.
     pub struct DataConfig {
-        /// Layout of the dataset, such as `dnerf` ([data.md](data.md) has them all). Empty: found by content. `train
-        /// --format` sets it.
+        /// Layout of the dataset, such as `dnerf`; [data.md](data.md) has all layouts. Empty: the layout is found by
+        /// content. `train --format` sets it.
         #[serde(with = "optional")]
         layout: Option<String> = None;
             NameOrNone { what: "layout", none: "found by content", names: || Layouts::default().names() },
@@ -70,13 +71,13 @@ keys! {
         frames: Option<usize> = None;
             WholeOrNone { least: 1, most: 1_000_000 },
             "reference, Neu3D: 300";
-        /// Frames per second of the capture; its length in seconds follows from them. Below 0.001: the rate that its
-        /// files state, if they state one.
+        /// Frames per second of the capture, from which its length in seconds follows. Below 0.001: the frame rate that
+        /// the capture's files state, if they state one.
         frames_a_second: f64 = 0.0; Number { least: 0.0, most: 1e5 }, "ours";
         /// First and last time of the images that are used, as shares of the capture. In the run of a take's segment,
         /// these are the times on which the segment is trained.
         between: [f64; 2] = [0.0, 1.0]; List { element: &SHARE, length: Some(2) }, "ours";
-        /// At most this number of times is used, spread evenly. 0: all.
+        /// Largest number of times that are used, spread evenly. 0: all times are used.
         #[serde(with = "optional")]
         most_times: Option<usize> = None; WholeOrNone { least: 1, most: 1_000_000 }, "ours";
         /// Larger images are reduced so that their longer side has this many pixels, keeping their shape. 0 leaves all as
@@ -86,13 +87,13 @@ keys! {
             WholeOrNone { least: 8, most: 16_384 }, "ours";
         /// Color behind transparent pixels, each channel 0 to 1.
         background: [f32; 3] = [1.0; 3]; List { element: &SHARE, length: Some(3) }, "reference, D-NeRF: white";
-        /// Where the times of images come from, in the layouts `colmap` and `nerfstudio`, if their files have none. `light4gs
+        /// Where the times of images come from, if a dataset in the layout `colmap` or `nerfstudio` has none. `light4gs
         /// check` says what was read.
         times: TimesKind = TimesKind::Auto; TimesKind::BOUNDS, "ours";
         /// How images are grouped into cameras, in the layouts `colmap` and `nerfstudio`.
         cameras: CamerasKind = CamerasKind::Auto; CamerasKind::BOUNDS, "ours";
-        /// Whether cameras of a rig that are some frames ahead of the others, or behind, are moved in time. Off:
-        /// `train` and `check` only report them.
+        /// Whether the times of a rig's camera are shifted if it is some frames ahead of the other cameras, or behind
+        /// them. Off: `train` and `check` only report such cameras.
         synchronize: bool = false; Flag, "ours";
         /// Upper bound of the memory for decoded images. Images that do not fit are decoded again, ahead of the
         /// iterations that need them.

@@ -59,8 +59,9 @@ keys! {
     pub struct Config {
         /// Seed of everything random in a run: scattering, splitting, the order of frames.
         seed: u64 = 0; Whole { least: 0, most: MOST_INTEGER }, "ours";
-        /// Back end that computes: `auto` (a graphics card where there is one, otherwise the processor), `ndarray`, `flex`, or `wgpu`, the last with an adapter if wanted: `wgpu:0` (by
-        /// number), `wgpu:discrete`, `wgpu:integrated`, `wgpu:cpu` (software driver).
+        /// Back end that computes: `auto` (a graphics card where there is one, otherwise the processor), `ndarray`,
+        /// `flex`, or `wgpu`. After `wgpu` an adapter can be named: `wgpu:0` (by number), `wgpu:discrete`,
+        /// `wgpu:integrated`, `wgpu:cpu` (software driver).
         device: DeviceName = DeviceName::default();
             Parsed { names: DEVICES, also: "wgpu also with an adapter" }, "ours";
         /// The training data.

@@ -17,11 +17,12 @@ keys! {
     pub struct TrainConfig {
         /// Iterations of the coarse stage: static Gaussians, no deformation.
         coarse_iterations: usize = 3000; ITERATIONS, "paper";
-        /// Iterations of the fine stage, which counts from 1 again with a new optimizer.
+        /// Iterations of the fine stage. They are counted from 1 again, and the optimizer is a new one.
         fine_iterations: usize = 30_000; ITERATIONS, "paper: 30000 for D-NeRF, 20000 elsewhere";
         /// Frames per iteration.
         batch_size: usize = 1; Whole { least: 1, most: 1024 }, "paper: 1 for D-NeRF, 2 to 4 elsewhere";
-        /// The loss by which rendered views are compared with the frames. The keys of each loss are in a table of its name.
+        /// The loss by which rendered views are compared with the frames. The keys of each loss are in the table with
+        /// the loss's name.
         loss: LossKind = LossKind::Photometric;
             LossKind::BOUNDS, "3DGS";
         /// The keys of the losses.
@@ -85,8 +86,9 @@ impl TrainConfig {
 }
 
 keys! {
-    /// Smaller images first, and fewer Gaussians for them: such an iteration takes a fraction of the time. The coarse stage has
-    /// the size with which the fine stage begins. No side of an image is made shorter than 200 pixels.
+    /// Training begins with smaller images, and with fewer Gaussians for them. Such an iteration takes a fraction of
+    /// the time. In the coarse stage, images have the size with which the fine stage begins. No side of an image is
+    /// made shorter than 200 pixels.
     pub struct CoarseToFineConfig {
         /// Images have a quarter of their width and height until this share of the fine stage is over. 0: never.
         quarter_until: f64 = 0.0; SHARE, "ours";
@@ -113,8 +115,8 @@ impl CoarseToFineConfig {
 }
 
 keys! {
-    /// Adam's rates. A pair of `init` and `final` decays exponentially; those of positions, deformation and feature planes are
-    /// multiplied by the scene's extent.
+    /// Adam's learning rates. A rate with an `init` and a `final` value decays exponentially from one to the other. The
+    /// rates of positions, deformation and feature planes are multiplied by the scene's extent.
     pub struct LearningRates {
         /// Learning rate of the deformation network at the first step.
         deformation_init: f64 = 1.6e-4; RATE, "reference";
@@ -125,8 +127,8 @@ keys! {
         /// Learning rate of the feature planes at the end of the schedule.
         planes_final: f64 = 1.6e-4; RATE, "reference";
         /// Learning rates of the Gaussians' attributes at the first step. Further attributes, such as `stillness` of
-        /// control nodes or one of a field of your own, can be named beside these; otherwise they have the rates that
-        /// the field gives them.
+        /// control nodes or one of a field of your own, can be named as well. If such an attribute is not named, it has
+        /// the rate that the field gives it.
         attributes_init: ByName = built_in(|attribute| Some(attribute.learning_rate.initial));
             Bounds::ByName(&RATE), "3DGS";
         /// Learning rates of the Gaussians' attributes at the end of the schedule. An attribute that is not named here
@@ -136,8 +138,8 @@ keys! {
         /// Length of the decay in iterations. 0: the length of the stage.
         #[serde(with = "optional")]
         schedule_steps: Option<usize> = None; ITERATION, "ours; reference: 20000";
-        /// Share of the fine stage, at its end, in which the rates of this table fall once more, so that the noise of
-        /// the steps is averaged away once motion has been found. 0: none.
+        /// Share of the fine stage, at its end, in which the rates of this table fall once more. So the noise of the
+        /// training steps is averaged away, after motion has been found. 0: none.
         cooldown: f64 = 0.0; SHARE, "ours; the last phase of warmup-stable-decay (Hu et al. 2024)";
         /// Factor by which the rates have fallen at the end of the cooldown.
         cooldown_factor: f64 = 0.1; Number { least: 1e-6, most: 1.0 }, "ours";

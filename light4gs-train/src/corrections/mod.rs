@@ -48,8 +48,8 @@ const CORRECTION_RATE: light4gs_keys::Bounds = Number { least: 1e-20, most: 0.1 
 keys! {
     /// What is corrected.
     pub struct CorrectionsConfig {
-        /// Whether each camera or each frame gets a gain and an offset of its own for each color channel. They are
-        /// learned, and are not in the file.
+        /// Whether each camera or each frame gets a gain and an offset of its own for each color channel. Gains and
+        /// offsets are learned, and are not in the file.
         exposure: CorrectionUnit = CorrectionUnit::None; CorrectionUnit::BOUNDS, "ours";
         /// Whether each camera or each frame gets a small rotation and translation of its own, which are learned.
         /// `"camera"` is for rigs that stand still. With `"frame"`, a camera that stands still gets one correction for
@@ -63,18 +63,20 @@ keys! {
 }
 
 keys! {
-    /// How corrections of exposures, poses and times are learned. The rates are Adam's, at the beginning and at the end
-    /// of a run, for a run that looks at each frame or camera a hundred times. If it looks less often, the rates are
-    /// larger in proportion, at most three times; if more often, smaller, at least a fifth.
+    /// How corrections of exposures, poses and times are learned. The rates are Adam's learning rates at the beginning
+    /// and at the end of a run that looks at each frame or camera a hundred times. If a run looks less often, its rates
+    /// are larger in proportion, but at most three times as large. If it looks more often, they are smaller in
+    /// proportion, but at least a fifth.
     pub struct CorrectionRates {
-        /// Poses and times are corrected from this iteration on, counted over both stages: before, there is no scene to compare with.
+        /// Poses and times are corrected from this iteration on, since before it there is no scene to compare with.
+        /// Iterations are counted over both stages.
         from: usize = 300; ITERATION, "ours";
-        /// Learning rate of exposures at the first step: of the logarithms of gains. Offsets, in shares of white, have
-        /// a quarter of it.
+        /// Learning rate of exposures at the first step. This is the rate of the logarithms of gains. The rate of
+        /// offsets, in shares of white, is a quarter of it.
         exposure_init: f64 = 2e-2; CORRECTION_RATE, "ours";
         /// Learning rate of exposures at the end of the run.
         exposure_final: f64 = 2e-4; CORRECTION_RATE, "ours";
-        /// Weight in the loss of the squares of exposures: of the logarithms of gains, and of offsets.
+        /// Weight, in the loss, of the squared logarithms of gains and the squared offsets of exposures.
         exposure_weight: f32 = 0.02; WEIGHT, "ours";
         /// Learning rate of the rotations of cameras at the first step, in radians.
         turn_init: f64 = 1e-3; CORRECTION_RATE, "ours";

@@ -5,7 +5,7 @@ use light4gs_keys::choice;
 choice! {
     /// What has a correction of its own.
     pub enum CorrectionUnit: "unit of corrections" {
-        /// Neither: the dataset is right.
+        /// No corrections: the dataset is right.
         None = "none",
         /// Each camera of a rig.
         Camera = "camera",

@@ -23,7 +23,7 @@ const MAX_SCREEN_RADIUS: f32 = 20.0;
 const MAX_EXTENT_SHARE: f32 = 0.1;
 
 keys! {
-    /// Adaptive density control (3DGS). Iterations count from 1 in each stage.
+    /// Adaptive density control (3DGS). Iterations are counted from 1 in each stage.
     pub struct AdaptiveDensityConfig {
         /// Cloning and splitting start after this iteration.
         from: usize = 500; ITERATION, "3DGS";
@@ -35,10 +35,10 @@ keys! {
         grad_threshold_coarse: f32 = 2e-4; THRESHOLD, "3DGS";
         /// Screen-space gradient above which a Gaussian is cloned or split, at the start of the fine stage.
         grad_threshold_fine_init: f32 = 2e-4; THRESHOLD, "reference";
-        /// Screen-space gradient above which a Gaussian is cloned or split, at the iteration `until` of the fine stage;
-        /// it changes linearly from `grad_threshold_fine_init`.
+        /// Screen-space gradient above which a Gaussian is cloned or split, at the iteration `until` of the fine stage.
+        /// Until then, the threshold changes linearly from `grad_threshold_fine_init`.
         grad_threshold_fine_final: f32 = 2e-4; THRESHOLD, "reference";
-        /// Gaussians up to this share of the scene's extent are cloned, larger ones split in two.
+        /// Gaussians up to this share of the scene's extent are cloned, and larger ones are split in two.
         percent_dense: f32 = 0.01; Number { least: 1e-9, most: 1e9 }, "3DGS";
         /// Largest number of Gaussians. At this bound, those with the largest gradients are cloned or split first.
         max_gaussians: usize = 360_000; Whole { least: 1, most: MOST_GAUSSIANS }, "reference; the largest first: ours";
@@ -46,15 +46,15 @@ keys! {
         opacity_threshold: f32 = 0.005; SHARE, "3DGS";
         /// Opacity below which a Gaussian counts as faint and is removed, at the start of the fine stage.
         opacity_threshold_fine_init: f32 = 0.005; SHARE, "reference";
-        /// Opacity below which a Gaussian counts as faint and is removed, at the iteration `until` of the fine stage;
-        /// it changes linearly from `opacity_threshold_fine_init`.
+        /// Opacity below which a Gaussian counts as faint and is removed, at the iteration `until` of the fine stage.
+        /// Until then, the threshold changes linearly from `opacity_threshold_fine_init`.
         opacity_threshold_fine_final: f32 = 0.005; SHARE, "reference";
         /// The removal of faint Gaussians starts after this iteration.
         prune_from: usize = 500; ITERATION, "reference";
         /// Iterations between two removals of faint Gaussians.
         prune_interval: usize = 100; INTERVAL, "reference";
-        /// Faint Gaussians are removed only if there are more Gaussians than this. While there are fewer, fast objects
-        /// survive the coarse stage, where they are faint. 0: always.
+        /// Faint Gaussians are removed only if there are more Gaussians than this. While there are fewer, all are kept,
+        /// so that fast objects, which are faint in the coarse stage, survive it. 0: always.
         prune_above: usize = 200_000;
             ITERATION, "reference: 200000";
         /// Iterations between two resets of the opacities; 0 = never.

@@ -53,7 +53,7 @@ choice! {
 keys! {
     /// How Gaussians are added and removed.
     pub struct DensifyConfig {
-        /// What decides the number of Gaussians. The keys of each strategy are in a table of its name.
+        /// What decides the number of Gaussians. The keys of each strategy are in the table with the strategy's name.
         strategy: DensityKind = DensityKind::Adaptive;
             DensityKind::BOUNDS, "3DGS";
         /// The keys of the strategies.

@@ -5,15 +5,16 @@ use light4gs_keys::{INTERVAL, choice, keys};
 use light4gs_model::{PixelContribution as Sum, Sensitivity, Significance, VolumeWeight};
 
 keys! {
-    /// Significance pruning (STP, paper III-B): passes after densification, each dropping the Gaussians that
-    /// contribute least to the training views at their times.
+    /// Significance pruning (STP, paper III-B). After densification, there are passes that each drop the Gaussians that
+    /// contribute least to the training views at the times of the views.
     pub struct PruneConfig {
         /// Share of the Gaussians that each pass drops; 0 = never. Two passes of 0.1, 0.2, 0.3, 0.4 drop 19, 36, 51,
         /// 64 %.
         fraction: f64 = 0.0;
             Number { least: 0.0, most: 0.999 },
             "paper: 0.1 to 0.4";
-        /// Iterations of the fine stage after which a pass takes place; all after the end of densification.
+        /// Iterations of the fine stage after which a pass takes place. All of them must be after the end of
+        /// densification.
         iterations: Vec<usize> = vec![15_001, 20_000];
             List { element: &INTERVAL, length: None },
             "paper: mid-way and near the end";
@@ -33,7 +34,7 @@ keys! {
 choice! {
     /// What a pixel adds to the score of each Gaussian that it blends.
     pub enum PruneScore: "score" {
-        /// Transmittance before the Gaussian times its opacity: the paper's.
+        /// The transmittance in front of the Gaussian, multiplied by the Gaussian's opacity. This is the paper's score.
         Transmittance = "transmittance",
         /// The squared change of the pixel's color if the Gaussian is removed (after SpeeDe3DGS).
         Sensitivity = "sensitivity",
@@ -45,7 +46,7 @@ choice! {
     pub enum PruneVolume: "volume" {
         /// 1.
         None = "none",
-        /// clamp(V / V_90, 0, 1)^exponent, where 90 % of the volumes are below V_90: the paper's.
+        /// clamp(V / V_90, 0, 1)^exponent, where 90 % of the volumes are below V_90. This is the paper's factor.
         Clamped = "clamped",
     }
 }

@@ -12,8 +12,8 @@ keys! {
     pub struct PhotometricLoss {
         /// Weight of D-SSIM in the loss, 0 to 1; the rest is the weight of L1.
         lambda_dssim: f32 = 0.0; SHARE, "reference";
-        /// The loss is the squared difference until this iteration of the fine stage (and in the coarse stage, if not
-        /// 0). L1 is smallest at the median, which for a fast object is the background behind it.
+        /// The loss is the squared difference until this iteration of the fine stage, and in the whole coarse stage. 0:
+        /// never. L1 is smallest at the median color, which for a fast object is the background behind it.
         l2_until: usize = 0; ITERATION, "ours";
     }
 }

@@ -8,9 +8,9 @@ use super::{BatchRequest, FrameSampler, Shuffled};
 use crate::stage::Stage;
 
 keys! {
-    /// Frames of a window of time that widens until it holds all times. Fast objects then move little from the known times
-    /// to the new ones. A survey (`survey`) shows all times first, so that the field finds where objects are. The coarse
-    /// stage sees the times with which the fine stage begins.
+    /// Frames of a window of time that widens until it holds all times. So even fast objects move little between the
+    /// times that are already learned and the new ones. A survey (`survey`) shows all times first, so that the field
+    /// finds where objects are. The coarse stage sees the times with which the fine stage begins.
     pub struct WideningWindow {
         /// Length of the survey, as a share of the fine stage: frames of all times are drawn before the first window begins.
         survey: f64 = 0.0; SHARE, "ours";
@@ -18,9 +18,10 @@ keys! {
         center: f64 = 0.5; SHARE, "ours";
         /// Number of different times in the first window.
         times: usize = 12; Whole { least: 1, most: 1_000_000 }, "ours";
-        /// The first window stays for this share of the fine stage's iterations after the survey.
+        /// Of the iterations that the fine stage has after the survey, the share during which the first window stays as
+        /// it is.
         held: f64 = 0.07; SHARE, "ours";
-        /// All times are seen after this share of the fine stage's iterations after the survey.
+        /// Of the iterations that the fine stage has after the survey, the share after which all times are seen.
         open: f64 = 0.6; SHARE, "ours";
         /// The share of the draws that go to the newest times while the window widens.
         newest: f64 = 0.3; SHARE, "ours";

@@ -21,7 +21,7 @@ pub(super) struct Bench {
     /// Back ends, separated by commas.
     #[arg(long, value_delimiter = ',', default_value = "ndarray,flex")]
     device: Vec<DeviceName>,
-    /// A scene file instead of generated ones (layout: docs/benchmarks.md).
+    /// A scene file, which is timed instead of generated scenes (layout: docs/benchmarks.md).
     #[arg(long, value_name = "FILE.safetensors", conflicts_with_all = ["gaussians", "size"])]
     scene: Vec<PathBuf>,
     /// Gaussians of the generated scenes.

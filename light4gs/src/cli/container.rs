@@ -51,12 +51,12 @@ pub(super) struct Encode {
     /// Upper bound of the file in bytes, such as 300k or 2M; the file comes close to it. Adapts the steps of attributes.
     #[arg(long, value_name = "NUMBER", value_parser = bytes)]
     target_bytes: Option<usize>,
-    /// Lower bound of the PSNR of the decoded file on the test views, dB: writes the smallest file above the bound. If no
-    /// file reaches it, writes the best one, and the exit code is 2.
+    /// Lower bound of the PSNR of the decoded file on the test views, dB: the smallest file above the bound is written.
+    /// If no file reaches the bound, the best file is written, and the exit code is 2.
     #[arg(long, value_name = "NUMBER", value_parser = decibels, conflicts_with = "target_bytes")]
     target_db: Option<f64>,
-    /// Layers of Gaussians, the most significant ones first. With several, such as 4, a player shows a coarse scene before the
-    /// whole file has arrived.
+    /// Number of layers of Gaussians, the most significant Gaussians first. With several layers, such as 4, a player
+    /// shows a coarse scene before the whole file has arrived.
     #[arg(long, value_name = "NUMBER")]
     layers: Option<usize>,
     /// Back end: auto (a graphics card if there is one), flex or ndarray (both on the processor), wgpu, or wgpu with an adapter

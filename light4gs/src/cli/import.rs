@@ -37,8 +37,8 @@ pub(super) struct Import {
     /// Folder of the new run, or for a PLY the .l4gs file to write.
     #[arg(long)]
     out: PathBuf,
-    /// Folder of the dataset on which the scene was trained. With it, quantization steps are searched on training images;
-    /// without it, on views around the scene.
+    /// Folder of the dataset on which the scene was trained. With this option, quantization steps are searched on
+    /// training images; otherwise, on views around the scene.
     #[arg(long)]
     scene: Option<PathBuf>,
     /// A preset or a TOML file that says how the scene is coded. The model itself comes from the source.

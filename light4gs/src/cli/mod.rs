@@ -56,8 +56,8 @@ enum Command {
     #[command(after_help = "Examples:\n  light4gs prepare walk.mp4 --out data/walk\n  light4gs prepare left.mp4 \
                             middle.mp4 right.mp4 --out data/stage\n  light4gs train data/walk --out runs/walk")]
     Prepare(prepare::Prepare),
-    /// Print what is read from a dataset, before anything is trained: cameras, times, lens, masks, points, unused images.
-    /// The exit code is 2 if a training could only fail.
+    /// Before anything is trained, print what is read from a dataset: cameras, times, lens, masks, points, unused
+    /// images. The exit code is 2 if a training could only fail.
     #[command(after_help = "Example:\n  light4gs check data/walk --html walk.html")]
     Check(check::Check),
     /// Train on a dataset, or on videos (which are first prepared).
@@ -107,7 +107,7 @@ enum Command {
         after_help = "Example:\n  light4gs study context-model data/dnerf/flag --config hexplane-dnerf-flag-cpu --seeds 3 --out runs/context"
     )]
     Study(study::Study),
-    /// Write the tables and the report of a study from its finished runs, and name the missing runs.
+    /// Write the tables and the report of a study from its finished runs, and print which runs are missing.
     #[command(after_help = "Example:\n  light4gs gather runs/context")]
     Gather(study::Gather),
     /// One task of a study, as its launcher starts it.

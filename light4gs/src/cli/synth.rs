@@ -37,7 +37,8 @@ pub(super) struct Synth {
 /// Options of a take.
 #[derive(Debug, Args)]
 struct Take {
-    /// Cameras of a take: one camera moves; several cameras stand still, and there is one more for testing [default: 1].
+    /// Number of cameras of a take. A single camera moves; several cameras stand still, and there is one more for
+    /// testing [default: 1].
     #[arg(long, requires = "seconds", allow_negative_numbers = true)]
     cameras: Option<usize>,
     /// Frames per second of a take [default: 30].

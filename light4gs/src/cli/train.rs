@@ -71,9 +71,9 @@ pub(super) struct Train {
     device: Option<DeviceName>,
     #[command(flatten)]
     wishes: Wishes,
-    /// Train a take, for captures of more than about ten seconds: a base that stands still, and segments of about this number of
-    /// seconds, which play as one file. `auto`: two seconds, but at least 45 and at most 90 frames. No segment crosses a cut. The
-    /// same command continues after an interruption.
+    /// Train a take, for captures of more than about ten seconds. A take has a base that stands still and segments of
+    /// about this number of seconds, and plays as one file. With `auto` a segment has two seconds, but at least 45 and
+    /// at most 90 frames. No segment crosses a cut. The same command continues after an interruption.
     #[arg(long, value_name = "SECONDS|auto", value_parser = segment_length)]
     segment: Option<SegmentLength>,
     #[command(flatten)]

@@ -29,7 +29,8 @@ const LONGEST: f64 = 50.0;
 
 #[derive(Clone, Copy, Debug, Args)]
 pub(super) struct Wishes {
-    /// Pixels of the longer side of the training images; smaller images are not enlarged. Adapts the number of Gaussians.
+    /// Pixels of the longer side of the training images; smaller images are not enlarged. This option also adapts the
+    /// number of Gaussians.
     #[arg(long, value_name = "NUMBER", value_parser = clap::value_parser!(u32).range(8..=16_384))]
     pixels: Option<u32>,
     /// Minutes of training on this machine, approximately. Adapts the number of iterations to the speed of the machine,

@@ -39,7 +39,8 @@ pub struct Manifest {
     pub seeds: u64,
     /// Every run.
     pub runs: Vec<ManifestRun>,
-    /// Absolute paths of other studies, whose equal trainings are not repeated.
+    /// Absolute paths of other studies. If one of their finished runs trained just as a run of this study would, its
+    /// training is reused, not repeated.
     #[serde(default)]
     pub reuse: Vec<PathBuf>,
 }

@@ -23,7 +23,7 @@ pub struct PlanOptions {
     pub schedule: Option<f64>,
     /// Overrides of every run.
     pub overrides: Vec<String>,
-    /// Runs of each variant on each scene, with different seeds. At least 1.
+    /// Number of runs of each variant on each scene, each with a seed of its own. At least 1.
     pub seeds: u64,
     /// Names of the trainings that the program has in addition, which values of an axis may ask for.
     pub trainings: Vec<String>,

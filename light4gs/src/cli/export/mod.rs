@@ -46,22 +46,24 @@ pub(super) struct Export {
     /// The .l4gs file, a scene or a take; or the folder of a run or of a take.
     #[arg(value_name = "FILE|RUN")]
     file: PathBuf,
-    /// Folder or file; the suffix of its name chooses the format. A folder (no suffix, a slash at the end, or an existing
-    /// folder) gets `0000.ply`, `0001.ply`, ...; it must not hold numbered PLY files of another sequence. .zip: the same PLY
-    /// files. .ply: a single time. .4dgs: the whole motion. .glb (KHR_gaussian_splatting): the whole motion of control nodes
-    /// (skin and animation), or a single time for other fields and with --time. From a take, .ply and .glb files have a single
-    /// time (--at, --base); --to glb writes a .glb for each segment.
+    /// Folder or file; the suffix of its name chooses the format. A folder (no suffix, a slash at the end, or an
+    /// existing folder) gets `0000.ply`, `0001.ply`, ...; it must not hold numbered PLY files of another sequence. A
+    /// .zip gets the same PLY files, a .ply a single time, a .4dgs the whole motion. A .glb (KHR_gaussian_splatting)
+    /// gets the whole motion of control nodes (skin and animation); for other fields, or with --time, a single time. A
+    /// .ply or .glb of a take gets a single time (--at) or the base alone (--base); --to glb writes a .glb for each
+    /// segment.
     #[arg(long, required_unless_present_any = ["html", "site"])]
     out: Option<PathBuf>,
-    /// Files of the folder. ply: a file for each frame. glb, for takes only: a file for each segment, with its motion and what
-    /// stands still around it; `base.glb` with what stands still over the whole take; and `segments.json` with the times of each.
+    /// Files of the folder. ply: a file for each frame. glb (for takes only): a file for each segment, with the
+    /// segment's motion and what stands still around it; `base.glb`, with what stands still over the whole take; and
+    /// `segments.json`, with the times of each segment.
     #[arg(long, value_enum, value_name = "KIND", default_value = "ply")]
     to: FolderOf,
     /// A single time of a take in seconds, for a .ply or .glb file.
     #[arg(long, value_name = "SECONDS", allow_negative_numbers = true, conflicts_with_all = ["frames", "fps", "time"])]
     at: Option<f64>,
-    /// Write only what stands still over the whole take, for a .ply or .glb file. The first bytes of the take are enough: its
-    /// index and its base.
+    /// Write only what stands still over the whole take, for a .ply or .glb file. For this, the first bytes of the
+    /// take's file are enough, which hold its index and its base.
     #[arg(long, conflicts_with_all = ["frames", "fps", "time", "at"])]
     base: bool,
     /// A page that plays the scene in a browser without any other file.
@@ -71,23 +73,24 @@ pub(super) struct Export {
     /// its link.
     #[arg(long, value_name = "DIR", conflicts_with_all = ["html", "out", "frames", "device", "time", "fps", "z_up", "limits", "at", "base"])]
     site: Option<PathBuf>,
-    /// The address at which the folder of --site will be. Previews of links need it.
+    /// The address at which the folder of --site will be. Previews of links need this address.
     #[arg(long, value_name = "ADDRESS", requires = "site")]
     url: Option<String>,
     /// The title of the page, and of previews of its link; by default the name stored in the file.
     #[arg(long, value_name = "TEXT", conflicts_with = "out")]
     title: Option<String>,
-    /// Dataset whose cameras the page offers; by default that of the run whose folder holds the file.
+    /// Dataset whose cameras the page offers; by default the dataset of the run whose folder holds the file.
     #[arg(long, conflicts_with = "out")]
     scene: Option<PathBuf>,
-    /// Number of frames over time 0 to 1, keyframes in a .glb; by default as many as the file was made from.
+    /// Number of frames from time 0 to time 1; in a .glb, number of keyframes. By default as many as the file was made
+    /// from.
     #[arg(long, value_parser = clap::value_parser!(u32).range(1..=i64::from(MOST_FRAMES)), allow_negative_numbers = true)]
     frames: Option<u32>,
     /// A single time, in [0, 1], for a .ply or .glb file. An output that can hold only one time gets time 0 by default.
     #[arg(long, allow_negative_numbers = true, conflicts_with_all = ["frames", "fps"])]
     time: Option<f32>,
-    /// Frames per second of a .4dgs, of a .glb with motion, and of the PLY files of a take; by default those of the source, or
-    /// 30.
+    /// Frames per second of a .4dgs, of a .glb with motion, and of the PLY files of a take; by default the source's
+    /// rate, or 30 if it is not known.
     #[arg(long, allow_negative_numbers = true)]
     fps: Option<f32>,
     /// For a .glb: the scene's z axis points up, as in Blender. The file is turned, since glTF's y axis points up.

@@ -49,7 +49,7 @@ pub(super) struct Render {
     /// The time of a frozen path, in [0, 1].
     #[arg(long, default_value_t = 0.0, allow_negative_numbers = true)]
     time: f32,
-    /// Width in pixels; by default that of the training images.
+    /// Width in pixels; by default the width of the training images.
     #[arg(long, value_parser = clap::value_parser!(u32).range(1..=i64::from(MOST_SIDE)), allow_negative_numbers = true)]
     width: Option<u32>,
     /// Distance of the orbit from the origin, world units.

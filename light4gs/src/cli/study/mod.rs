@@ -47,14 +47,14 @@ pub(super) struct Study {
     /// Folders of the datasets.
     scenes: Vec<PathBuf>,
     /// Folder for the runs, the tables and the report. Finished runs are not repeated, and runs that differ only in how
-    /// the file is written are trained once.
+    /// the file is written share one training.
     #[arg(long)]
     out: Option<PathBuf>,
-    /// The preset or TOML file that every variant starts from, in place of hexplane-dnerf-cpu or the study's own; {scene} in it
-    /// stands for the scene's name.
+    /// The preset or TOML file that every variant starts from, in place of hexplane-dnerf-cpu or the study's own;
+    /// {scene} in this name stands for the scene's name.
     #[arg(long, value_name = "PRESET|FILE")]
     config: Option<String>,
-    /// Factor of the length of every variant's schedule, such as 0.25 for a first look.
+    /// Factor by which the length of every variant's schedule is multiplied, such as 0.25 for a first look.
     #[arg(long, value_name = "FACTOR")]
     schedule: Option<f64>,
     /// Changes one key of every variant's configuration; may be given more than once.
@@ -64,14 +64,17 @@ pub(super) struct Study {
     /// such as wgpu:0.
     #[arg(long)]
     device: Option<DeviceName>,
-    /// Runs of each variant on each scene, with different seeds. Tables then show means and standard deviations.
+    /// Number of runs of each variant on each scene, each with a seed of its own. Tables then show means and standard
+    /// deviations.
     #[arg(long, default_value_t = 1, value_parser = clap::value_parser!(u64).range(1..=1000))]
     seeds: u64,
-    /// Folder of another study; its equal trainings are reused. May be given more than once.
+    /// Folder of another study. If one of its finished runs trained just as a run of this study would, its training is
+    /// reused, not repeated. May be given more than once.
     #[arg(long, value_name = "STUDY")]
     reuse: Vec<PathBuf>,
-    /// Only the runs with these parts in their names SCENE/VALUE+VALUE/seed-K, such as 400,small,seed-0. Several scenes,
-    /// values of one axis, or seeds are alternatives. The other runs stay missing.
+    /// Train only the runs that have these parts, such as 400,small,seed-0, in their names SCENE/VALUE+VALUE/seed-K. If
+    /// several scenes, several values of one axis or several seeds are given, a run needs only one of them. The other
+    /// runs stay missing.
     #[arg(long, value_delimiter = ',', value_name = "PART")]
     only: Vec<String>,
     /// Print the runs, without training.

@@ -69,21 +69,22 @@ keys! {
     pub struct NodesFieldConfig {
         /// Number of nodes; never more than there are Gaussians.
         count: usize = 32; Whole { least: 1, most: MOST_NODES as u64 }, "ours; SC-GS: 512";
-        /// Training times between two knots of a trajectory.
+        /// Number of training times from one knot of a trajectory to the next.
         times_a_knot: f64 = 4.0; Number { least: 0.1, most: 1e6 }, "ours";
         /// A node's radius at the beginning, as a share of the distance to the nearest other node.
         radius: f64 = 0.6; Number { least: 0.01, most: 100.0 }, "ours";
         /// Nodes are placed at Gaussians with at least this opacity.
         opacity: f64 = 0.15; Number { least: 1e-4, most: 0.999 }, "ours";
-        /// Every Gaussian learns a stillness: its logit for one more node, which never moves.
+        /// Every Gaussian learns a stillness: its skinning logit for an additional node that never moves.
         stillness: bool = true; Flag, "ours";
-        /// Stillness at the beginning. For comparison: at a node's own anchor, the logit of this node is 0.
+        /// Stillness at the beginning. For comparison: a Gaussian at a node's anchor has a logit of 0 for that node.
         stillness_start: f64 = -4.0; Number { least: -30.0, most: 30.0 }, "ours";
-        /// Every Gaussian learns a lifetime: its opacity is multiplied by a bell curve over time, from the iteration on at
-        /// which the sampler's window holds all times.
+        /// Every Gaussian learns a lifetime, a bell curve over time by which its opacity is multiplied. This begins
+        /// with the iteration at which the sampler's window holds all times.
         lifetime: bool = false; Flag, "ours";
-        /// Number of affinities: length of a learned vector of each Gaussian and each node; the inner product of both
-        /// is added to the logit of the skinning weight. So a foot and the floor under it need not move together.
+        /// Length of the affinities, which are learned vectors of Gaussians and of nodes. The inner product of a
+        /// Gaussian's and a node's affinity is added to the logit of the skinning weight. So a foot and the floor under
+        /// it need not move together.
         affinities: usize = 0; Whole { least: 0, most: MOST_AFFINITIES as u64 }, "after SC-GS";
         /// Weight of the term that keeps each node where its neighbors expect it (as rigid as possible).
         rigidity: f64 = 1.0; WEIGHT, "ours; SC-GS: 1e-4 to 0";
