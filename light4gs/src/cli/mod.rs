@@ -102,7 +102,7 @@ enum Command {
     /// Make a synthetic dataset: the scene of the quickstart, or a take (--seconds).
     #[command(after_help = "Example:\n  light4gs synth data/synthetic --resolution 200")]
     Synth(synth::Synth),
-    /// Make a table or a figure of the paper, or one of your own: train variants of scenes, and compare them.
+    /// Make a table or a figure of the paper, or one of your own: train variants of a configuration on scenes, and compare them.
     #[command(
         after_help = "Example:\n  light4gs study context-model data/dnerf/flag --config hexplane-dnerf-flag-cpu --seeds 3 --out runs/context"
     )]
