@@ -12,6 +12,7 @@ use crate::frame::Frame;
 pub fn turn_between_frames(frames: &[Frame]) -> f32 {
     let mut frames: Vec<&Frame> = frames.iter().collect();
     frames.sort_by(|a, b| a.time.total_cmp(&b.time));
+    // A few equal times, of frames that were taken twice, make no rig.
     let shared = frames.windows(2).filter(|pair| pair[0].time == pair[1].time).count();
     if 4 * shared > frames.len() {
         return 0.0;

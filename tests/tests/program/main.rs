@@ -15,6 +15,7 @@ mod take_export;
 mod takes;
 #[cfg(target_os = "linux")]
 mod view;
+mod wishes;
 
 /// The program under test: Cargo builds it before these tests.
 const PROGRAM: &str = env!("CARGO_BIN_EXE_light4gs-under-test");

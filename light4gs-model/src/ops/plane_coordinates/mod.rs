@@ -104,7 +104,7 @@ pub struct Standardization {
 ///
 /// ```text
 /// s_j = axis_j · (point - mean) / std_j
-/// s   = s min(1, (2 - 1/|s|) / |s|)        where space is contracted (Barron et al. 2022, equation 10)
+/// s = s (2 - 1/r) / r,   r = max(|s|, 1)        if space is contracted (Barron et al. 2022, equation 10)
 /// coordinates = s · scale + offset
 /// ```
 ///
