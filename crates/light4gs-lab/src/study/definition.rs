@@ -59,6 +59,10 @@ pub struct Study {
     /// How it differs from that, and what to look for; may be empty.
     #[serde(default)]
     pub notes: String,
+    /// The preset or file that variants start from, where neither a value nor the command names one; [`DEFAULT_CONFIG`] if
+    /// not given.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub config: Option<String>,
     /// Presets that are laid on top of the base configuration in every run, before those of the axes.
     #[serde(default)]
     pub presets: Vec<String>,
@@ -119,8 +123,8 @@ pub struct AxisValue {
     /// For tables and plots; the name if not given.
     #[serde(default)]
     pub label: Option<String>,
-    /// The preset or file that variants with this value start from, where the command names none; [`DEFAULT_CONFIG`] if not
-    /// given. A preset that extends another one can stand only here.
+    /// The preset or file that variants with this value start from, whatever the command names: it is what the value is
+    /// about. A preset that extends another one can stand only here or at [`Study::config`].
     #[serde(default)]
     pub config: Option<String>,
     /// Presets or files, which are laid on top in this order.

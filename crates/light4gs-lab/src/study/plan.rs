@@ -183,8 +183,8 @@ fn check_reference(study: &Study, variants: &[Variant]) -> Result<(), TrainError
 
 fn config_of(study: &Study, variant: &Variant, scene: &str, options: &PlanOptions) -> Result<Config, TrainError> {
     let chosen = || study.axis.iter().zip(&variant.values).map(|(axis, value)| &axis.value[*value]);
-    let start = chosen().find_map(|value| value.config.as_ref());
-    let base = options.config.as_ref().or(start).map_or(DEFAULT_CONFIG, String::as_str);
+    let own = chosen().find_map(|value| value.config.as_ref());
+    let base = own.or(options.config.as_ref()).or(study.config.as_ref()).map_or(DEFAULT_CONFIG, String::as_str);
     let mut names = vec![base.replace(SCENE_PLACE, scene)];
     names.extend(study.presets.iter().cloned());
     names.extend(chosen().flat_map(|value| value.presets.iter().cloned()));
@@ -274,6 +274,8 @@ fn scene_name(path: &Path) -> Result<String, TrainError> {
 
 #[cfg(test)]
 mod tests {
+    use light4gs_model::FieldKind;
+
     use super::*;
 
     fn study(axes: &str) -> Study {
@@ -330,6 +332,30 @@ value = [{ name = "three", label = "degree 3" }, { name = "one", set = ["model.s
     }
 
     /// The factors of the command and of a value are multiplied, and what is set by hand wins.
+    /// A row of the paper's system stays the paper's, whatever the other rows start from.
+    #[test]
+    fn a_value_starts_from_its_own_configuration() {
+        let folder = tempfile::tempdir().unwrap();
+        let scene = folder.path().join("scene");
+        std::fs::create_dir(&scene).unwrap();
+        let axes = r#"
+[[axis]]
+name = "system"
+value = [{ name = "paper", config = "paper-dnerf" }, { name = "other" }]
+"#;
+        let fields = |config: Option<&str>, study: &Study| {
+            let options = PlanOptions { config: config.map(str::to_owned), ..options(&scene) };
+            let plan = Plan::new(study.clone(), &options).unwrap();
+            plan.runs.iter().map(|run| run.config.model.field).collect::<Vec<_>>()
+        };
+        let (planes, nodes) = (FieldKind::HexPlane, FieldKind::Nodes);
+        assert_eq!(fields(Some("dnerf"), &study(axes)), [planes, nodes]);
+        assert_eq!(fields(None, &study(axes)), [planes, planes]);
+        let own = study(&format!("config = \"dnerf\"\n{axes}"));
+        assert_eq!(fields(None, &own), [planes, nodes]);
+        assert_eq!(fields(Some("hexplane-dnerf"), &own), [planes, planes]);
+    }
+
     #[test]
     fn a_schedule_can_be_longer_or_shorter() {
         let folder = tempfile::tempdir().unwrap();

@@ -50,8 +50,8 @@ pub(super) struct Study {
     /// the file is written share one training.
     #[arg(long)]
     out: Option<PathBuf>,
-    /// The preset or TOML file that every variant starts from, in place of hexplane-dnerf-cpu or the study's own;
-    /// {scene} in this name stands for the scene's name.
+    /// The preset or TOML file that variants start from, in place of the study's own or of hexplane-dnerf-cpu; {scene} in
+    /// this name stands for the scene's name. A value that names its own keeps it.
     #[arg(long, value_name = "PRESET|FILE")]
     config: Option<String>,
     /// Factor by which the length of every variant's schedule is multiplied, such as 0.25 for a first look.
