@@ -1,5 +1,5 @@
 // The exponential of numbers up to 0, to about one unit in the last place. WGSL allows its own to be wrong by 3 + 2 |x|
-// units. At the exponents of a distribution's tail, that is most of the digits that `normal_cdf.wgsl` must keep.
+// units. At the exponents of a distribution's tail, that is most of the digits that `normal.wgsl` must keep.
 
 // 2^n for n from -126 to 127.
 fn power_of_two(n: i32) -> f32 {

@@ -85,22 +85,18 @@ impl EntropyParameters {
         context: Option<Tensor<3>>,
         [height, width]: [usize; 2],
     ) -> NormalParameters<3> {
-        let [first, rest @ ..] = &self.layers;
-        let [outputs, inputs, ..] = first.weight.dims();
-        let weight = first.weight.val().reshape([outputs, inputs]);
-        let half = inputs / 2;
-        let bias = first.bias.val().unsqueeze_dim::<2>(1);
-        // Products with zeros are not computed.
-        let hidden = [(0, parameters), (half, context)]
-            .into_iter()
-            .filter_map(|(start, input)| {
-                let input = input?.reshape([half, height * width]);
-                Some(weight.clone().narrow(1, start, half).matmul(input))
-            })
-            .reduce(|sum, product| sum + product)
-            .map_or_else(|| bias.clone().expand([outputs, height * width]), |product| product + bias.clone());
-        let hidden = hidden.reshape([outputs, height, width]);
-        let output = rest.iter().fold(hidden, |hidden, layer| layer.forward(leaky_relu(hidden, LEAKY_SLOPE)));
+        let [first, second, last] = &self.layers;
+        let hidden = match (parameters, context) {
+            (Some(parameters), Some(context)) => first.rectified(Tensor::cat(vec![parameters, context], 0)),
+            (Some(parameters), None) => first.rectified_part(parameters, 0),
+            (None, Some(context)) => first.rectified_part(context.clone(), context.dims()[0]),
+            (None, None) => {
+                let bias: Tensor<3> = first.bias.val().reshape([-1, 1, 1]);
+                let outputs = bias.dims()[0];
+                leaky_relu(bias, LEAKY_SLOPE).expand([outputs, height, width])
+            }
+        };
+        let output = last.forward(second.rectified(hidden));
         let [doubled, ..] = output.dims();
         let channels = doubled / 2;
         NormalParameters { scales: output.clone().narrow(0, 0, channels), means: output.narrow(0, channels, channels) }

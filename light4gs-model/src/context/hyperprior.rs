@@ -2,7 +2,6 @@
 
 use burn::config::Config;
 use burn::module::Module;
-use burn::tensor::activation::leaky_relu;
 use burn::tensor::{Device, Tensor};
 use light4gs_codec::plane_layout::PlaneLayout;
 use light4gs_codec::{Network, PlaneSource};
@@ -61,13 +60,12 @@ impl Hyperprior {
     /// The latent `[N, H / 4, W / 4]` of a plane `[M, H, W]` in steps.
     pub fn analyze(&self, plane: Tensor<3>) -> Tensor<3> {
         let [first, second, third] = &self.analysis;
-        let hidden = leaky_relu(first.forward(plane), LEAKY_SLOPE);
-        third.forward(leaky_relu(second.forward(hidden), LEAKY_SLOPE))
+        third.forward(second.rectified(first.rectified(plane)))
     }
 
     /// Parameters `[2 M, H, W]` from a decoded latent `[N, H / 4, W / 4]`.
     pub fn synthesize(&self, latent: Tensor<3>) -> Tensor<3> {
-        let up = self.synthesis_up.iter().fold(latent, |hidden, layer| leaky_relu(layer.forward(hidden), LEAKY_SLOPE));
+        let up = self.synthesis_up.iter().fold(latent, |hidden, layer| layer.rectified(hidden));
         self.synthesis_out.forward(up)
     }
 

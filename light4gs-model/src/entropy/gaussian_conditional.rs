@@ -4,8 +4,7 @@
 
 use burn::tensor::Tensor;
 
-use crate::ops::lower_bound::lower_bound;
-use crate::ops::normal_cdf::normal_cdf;
+use crate::ops::normal_likelihood::{NormalBounds, normal_likelihood};
 
 /// Standard deviations below this are raised to it.
 pub const SCALE_BOUND: f32 = 0.11;
@@ -24,7 +23,7 @@ pub struct NormalParameters<const D: usize> {
 /// Probability of the unit interval around each value, at least [`LIKELIHOOD_BOUND`].
 ///
 /// `values` are in y units and have the shape of the parameters. Scales may have any value: they are bounded below by
-/// [`SCALE_BOUND`], with the gradient of [`lower_bound`].
+/// [`SCALE_BOUND`], with the gradient of [`lower_bound`](crate::ops::lower_bound::lower_bound).
 ///
 /// ```
 /// use burn::tensor::{Device, Tensor};
@@ -37,12 +36,8 @@ pub struct NormalParameters<const D: usize> {
 /// ```
 pub fn gaussian_likelihood<const D: usize>(values: Tensor<D>, parameters: NormalParameters<D>) -> Tensor<D> {
     let NormalParameters { means, scales } = parameters;
-    let scales = lower_bound(scales, SCALE_BOUND);
-    // On the lower side of the mean, where the distribution function is small and has full precision.
-    let distance = (values - means).abs().neg();
-    let upper = normal_cdf((distance.clone() + 0.5) / scales.clone());
-    let lower = normal_cdf((distance - 0.5) / scales);
-    lower_bound(upper - lower, LIKELIHOOD_BOUND)
+    let bounds = NormalBounds { scale: SCALE_BOUND, likelihood: LIKELIHOOD_BOUND };
+    normal_likelihood(values, means, scales, bounds)
 }
 
 /// Bits of a symbol of this likelihood, elementwise.

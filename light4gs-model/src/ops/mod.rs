@@ -30,7 +30,8 @@ pub mod neighborhoods;
 pub mod node_poses;
 pub mod node_regularizer;
 pub mod noise_gradient;
-pub mod normal_cdf;
+pub mod normal_likelihood;
+pub mod plane_convolution;
 pub mod plane_coordinates;
 pub mod plane_query;
 pub mod plane_regularizer;
@@ -72,7 +73,8 @@ pub const ON_GPU: &[GpuOperation] = &[
     node_poses::gpu::OPERATION,
     node_regularizer::gpu::OPERATION,
     noise_gradient::gpu::OPERATION,
-    normal_cdf::gpu::OPERATION,
+    normal_likelihood::gpu::OPERATION,
+    plane_convolution::gpu::OPERATION,
     plane_coordinates::gpu::OPERATION,
     plane_query::gpu::OPERATION,
     plane_regularizer::gpu::OPERATION,

@@ -1,7 +1,6 @@
 //! Two layers, from known values of a Gaussian to the distributions of its spherical harmonics.
 
 use burn::module::{Module, Param};
-use burn::tensor::activation::leaky_relu;
 use burn::tensor::{Device, Tensor};
 use light4gs_codec::Network;
 use light4gs_codec::network::Value;
@@ -30,7 +29,7 @@ impl ShNetwork {
     /// `[2 C, 1, N]` from `features [I, 1, N]`.
     pub fn forward(&self, features: Tensor<3>) -> Tensor<3> {
         let [first, last] = &self.layers;
-        last.forward(leaky_relu(first.forward(features), LEAKY_SLOPE))
+        last.forward(first.rectified(features))
     }
 
     /// The same computation as [`Self::forward`], for the codec's exact executor.

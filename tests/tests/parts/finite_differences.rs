@@ -15,7 +15,7 @@ use burn::tensor::{Device, Tensor, TensorData};
 use light4gs_codec::plane_layout::PlaneAxes;
 use light4gs_data::Camera;
 use light4gs_model::ops::lower_bound::lower_bound;
-use light4gs_model::ops::normal_cdf::normal_cdf;
+use light4gs_model::ops::normal_likelihood::{NormalBounds, normal_likelihood};
 use light4gs_model::{FeaturePlanes, PlaneTensors};
 use light4gs_tests::golden::{assert_close_relative, devices, values_of};
 use light4gs_tests::random::Random;
@@ -359,12 +359,31 @@ fn lower_bound_above_the_bound() {
     }
 }
 
+/// No bound is near.
+const BOUNDS: NormalBounds = NormalBounds { scale: 0.01, likelihood: 1e-37 };
+
 #[test]
-fn normal_cdf_along_random_directions() {
+fn normal_likelihood_along_random_directions() {
     for (name, device) in devices() {
+        let device = device.autodiff();
         let mut random = Random::new(201);
-        let values: Vec<f64> = (0..50).map(|_| random.uniform(-3.0, 3.0)).collect();
-        check_elementwise(&format!("{name} normal cdf"), &values, normal_cdf, &device.autodiff(), &mut random);
+        let [values, means]: [Vec<f64>; 2] = [(); 2].map(|()| (0..50).map(|_| random.uniform(-1.5, 1.5)).collect());
+        let scales: Vec<f64> = (0..50).map(|_| random.uniform(0.2, 2.0)).collect();
+        let tensor = |values: &[f64]| {
+            let values: Vec<f32> = values.iter().map(|v| *v as f32).collect();
+            Tensor::<1>::from_floats(values.as_slice(), &device)
+        };
+        let inputs = [values, means, scales];
+        for (k, what) in ["values", "means", "scales"].into_iter().enumerate() {
+            let operation = |x: Tensor<1>| {
+                let mut tensors = inputs.each_ref().map(|input| tensor(input));
+                tensors[k] = x;
+                let [values, means, scales] = tensors;
+                normal_likelihood(values, means, scales, BOUNDS)
+            };
+            let what = format!("{name} normal likelihood, {what}");
+            check_elementwise(&what, &inputs[k], operation, &device, &mut random);
+        }
     }
 }
 
@@ -373,32 +392,36 @@ fn normal_density_twin(x: f64) -> f64 {
     (-0.5 * x * x).exp() / std::f64::consts::TAU.sqrt()
 }
 
-/// The standard normal distribution function: its density integrated by Simpson's rule from far below.
-fn normal_cdf_twin(x: f64) -> f64 {
-    const CELLS: usize = 20_000;
-    let low = x.min(0.0) - 12.0;
-    let step = (x - low) / CELLS as f64;
+/// The mass between two places: the density integrated by Simpson's rule.
+fn normal_mass_twin(low: f64, high: f64) -> f64 {
+    const CELLS: usize = 2000;
+    let step = (high - low) / CELLS as f64;
     let inner = (1..CELLS).map(|i| normal_density_twin(low + i as f64 * step) * if i % 2 == 1 { 4.0 } else { 2.0 });
-    (normal_density_twin(low) + inner.sum::<f64>() + normal_density_twin(x)) * step / 3.0
+    (normal_density_twin(low) + inner.sum::<f64>() + normal_density_twin(high)) * step / 3.0
 }
 
 /// Relative errors, down to probabilities at which nothing is coded any more: the bits of a symbol are a logarithm.
 #[test]
-fn normal_cdf_against_the_twin() {
-    let places: Vec<f64> = (-90..=60).map(|i| f64::from((f64::from(i) * 0.1) as f32)).collect();
+fn normal_likelihood_against_the_twin() {
     for (name, device) in devices() {
         let device = device.autodiff();
-        let values: Vec<f32> = places.iter().map(|v| *v as f32).collect();
-        let leaf = Tensor::<1>::from_floats(values.as_slice(), &device).require_grad();
-        let found = normal_cdf(leaf.clone());
-        let gradient = values_of(&leaf.grad(&found.clone().sum().backward()).unwrap());
-        for ((x, found), gradient) in places.iter().zip(values_of(&found)).zip(gradient) {
-            let expected = normal_cdf_twin(*x);
-            let error = (f64::from(found) / expected - 1.0).abs();
-            assert!(error < 5e-6, "{name} at {x}: {found} against {expected}, off by {error:e} of it");
-            let slope = normal_density_twin(*x);
-            let error = (f64::from(gradient) / slope - 1.0).abs();
-            assert!(error < 5e-6, "{name} slope at {x}: {gradient} against {slope}, off by {error:e} of it");
+        for scale in [0.4, 1.0, 3.0] {
+            let places: Vec<f64> = (-90..=90).map(|i| f64::from((f64::from(i) * 0.1 * scale) as f32)).collect();
+            let values: Vec<f32> = places.iter().map(|v| *v as f32).collect();
+            let leaf = Tensor::<1>::from_floats(values.as_slice(), &device).require_grad();
+            let found = normal_likelihood(leaf.clone(), leaf.zeros_like(), leaf.ones_like() * scale, BOUNDS);
+            let gradient = values_of(&leaf.grad(&found.clone().sum().backward()).unwrap());
+            for ((x, found), gradient) in places.iter().zip(values_of(&found)).zip(gradient) {
+                let scale = f64::from(scale as f32);
+                let [low, high] = [-0.5, 0.5].map(|half| (x + half) / scale);
+                let expected = normal_mass_twin(low, high);
+                // Where the interval is small in its distribution, the difference of two masses has lost a digit.
+                let error = (f64::from(found) / expected - 1.0).abs();
+                assert!(error < 1e-5, "{name} at {x} in {scale}: {found} against {expected}, off by {error:e} of it");
+                let [at_low, at_high] = [low, high].map(|place| normal_density_twin(place) / scale);
+                let error = (f64::from(gradient) - (at_high - at_low)).abs() / (at_high + at_low);
+                assert!(error < 5e-6, "{name} slope at {x}: {gradient}, off by {error:e} of the densities");
+            }
         }
     }
 }

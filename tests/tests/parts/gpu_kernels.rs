@@ -4,7 +4,7 @@
 use burn::tensor::{Device, Tensor, Transaction};
 use light4gs_model::ops::activation::{bounded_exponential, sigmoid};
 use light4gs_model::ops::lower_bound::lower_bound;
-use light4gs_model::ops::normal_cdf::normal_cdf;
+use light4gs_model::ops::normal_likelihood::{NormalBounds, normal_likelihood};
 use light4gs_model::ops::uniform_noise::{NoiseDraw, add_uniform_noise};
 use light4gs_model::{GpuError, HexPlaneConfig, PixelContribution, PlaneTensors, Significance, Splatter};
 use light4gs_tests::odd_scenes::dots;
@@ -23,13 +23,19 @@ fn run(function: fn(Tensor<1>) -> Tensor<1>, device: Device, count: usize) -> [V
     [values.into_data(), gradient.into_data()].map(|data| data.iter::<f32>().collect())
 }
 
+/// Under the standard normal distribution, with a bound that no place here reaches.
+fn around_zero(places: Tensor<1>) -> Tensor<1> {
+    let (means, scales) = (places.zeros_like(), places.ones_like());
+    normal_likelihood(places, means, scales, NormalBounds { scale: 0.11, likelihood: 1e-37 })
+}
+
 #[test]
 fn values_and_gradients_are_those_of_the_cpu() {
     type Function = fn(Tensor<1>) -> Tensor<1>;
-    // Of values and slopes. That of the logistic function has a difference from 1, whose rounding counts; that of the
-    // exponential is ten times its value.
+    // Of values and slopes. Slopes of a likelihood and of the logistic function have a difference, whose rounding counts; that of
+    // the exponential is ten times its value.
     let functions: [(&str, Function, [f32; 2]); 4] = [
-        ("normal cdf", normal_cdf, [f32::MIN_POSITIVE; 2]),
+        ("normal likelihood", around_zero, [f32::MIN_POSITIVE, f32::EPSILON]),
         ("lower bound", |x| lower_bound(x, 0.11), [0.0; 2]),
         ("sigmoid", sigmoid, [0.0, f32::EPSILON]),
         ("bounded exponential", |x| bounded_exponential(x * 10.0), [f32::MIN_POSITIVE, 10.0 * f32::MIN_POSITIVE]),

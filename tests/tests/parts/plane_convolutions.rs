@@ -1,10 +1,11 @@
 //! Convolutions over planes against Burn's own: values and gradients.
 
 use burn::module::Param;
+use burn::tensor::activation::leaky_relu;
 use burn::tensor::module::{conv_transpose2d, conv2d};
 use burn::tensor::ops::{ConvOptions, ConvTransposeOptions};
 use burn::tensor::{Device, Distribution, Gradients, Tensor};
-use light4gs_model::{PlaneConvConfig, PlaneDeconvConfig};
+use light4gs_model::{LEAKY_SLOPE, PlaneConvConfig, PlaneDeconvConfig, checkerboard_kernel};
 use light4gs_tests::golden::{assert_close_relative, devices, values_of};
 
 type Output = (Tensor<3>, [Vec<f32>; 3]);
@@ -69,10 +70,49 @@ fn convolution() {
             let conv = config.init(&device);
             let plane = random_plane([inputs, height, width], &device);
             let options = ConvOptions::new([stride; 2], [kernel / 2; 2], [1, 1], groups);
-            let burns = conv2d(plane.clone().unsqueeze::<4>(), conv.weight.val(), Some(conv.bias.val()), options);
+            // A tape serves one backward pass.
+            let burns = || -> Tensor<3> {
+                let plane = plane.clone().unsqueeze::<4>();
+                conv2d(plane, conv.weight.val(), Some(conv.bias.val()), options.clone()).squeeze_dim(0)
+            };
             let what = format!("{name} {inputs}->{outputs} kernel {kernel} stride {stride} groups {groups}");
+            compare(&what, &plane, &conv.weight, &conv.bias, conv.forward(plane.clone()), burns());
+            let rectified = conv.rectified(plane.clone());
+            let what = format!("{what}, rectified");
+            compare(&what, &plane, &conv.weight, &conv.bias, rectified, leaky_relu(burns(), LEAKY_SLOPE));
+        }
+    }
+}
+
+/// Masked taps are neither used nor have a gradient, whatever their weights are.
+#[test]
+fn checkerboard_convolution() {
+    for (name, device) in devices() {
+        let device = device.autodiff();
+        for groups in [1, 4] {
+            let config = PlaneConvConfig::new(4, 8, 5).with_groups(groups).with_checkerboard(true);
+            let mut conv = config.init(&device);
+            conv.weight = Param::from_tensor(Tensor::random([8, 4 / groups, 5, 5], Distribution::Default, &device));
+            let plane = random_plane([4, 6, 9], &device);
+            let options = ConvOptions::new([1; 2], [2; 2], [1, 1], groups);
+            let weight = conv.weight.val() * checkerboard_kernel(5, &device).unsqueeze::<4>();
+            let burns = conv2d(plane.clone().unsqueeze::<4>(), weight, Some(conv.bias.val()), options);
+            let what = format!("{name} checkerboard, groups {groups}");
             compare(&what, &plane, &conv.weight, &conv.bias, conv.forward(plane.clone()), burns.squeeze_dim(0));
         }
+    }
+}
+
+/// A part of the channels is the whole with zeros in place of the others.
+#[test]
+fn convolution_of_a_part() {
+    for (name, device) in devices() {
+        let conv = PlaneConvConfig::new(6, 4, 1).init(&device);
+        let part = Tensor::random([3, 5, 7], Distribution::Normal(0.0, 1.0), &device);
+        let zeros = Tensor::zeros([3, 5, 7], &device);
+        let whole = conv.rectified(Tensor::cat(vec![zeros, part.clone()], 0));
+        let found = values_of(&conv.rectified_part(part, 3));
+        assert_close_relative(&format!("{name} part"), &found, &values_of(&whole), 1e-6);
     }
 }
 
@@ -87,7 +127,8 @@ fn transposed_convolution() {
             let input = plane.clone().unsqueeze::<4>();
             let burns = conv_transpose2d(input, deconv.weight.val(), Some(deconv.bias.val()), options);
             let what = format!("{name} {inputs}->{outputs} transposed, {height}×{width}");
-            compare(&what, &plane, &deconv.weight, &deconv.bias, deconv.forward(plane.clone()), burns.squeeze_dim(0));
+            let burns = leaky_relu(burns.squeeze_dim::<3>(0), LEAKY_SLOPE);
+            compare(&what, &plane, &deconv.weight, &deconv.bias, deconv.rectified(plane.clone()), burns);
         }
     }
 }

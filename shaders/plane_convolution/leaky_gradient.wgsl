@@ -1,14 +1,13 @@
-// Derivative of the standard normal distribution function: its density times the upstream gradient.
+// The gradient through a leaky ReLU, from its output, which has the sign of its input.
 //
-// Each invocation computes one value. It reads `places` and `upstream`, and writes `gradients`.
-
-// #include exponential
+// Each invocation computes one value. It reads `outputs` and `upstream`, and writes `gradients`.
 
 struct Parameters {
     count: u32,
+    slope: f32,
 }
 
-@group(0) @binding(0) var<storage, read_write> places: array<f32>;
+@group(0) @binding(0) var<storage, read_write> outputs: array<f32>;
 @group(0) @binding(1) var<storage, read_write> upstream: array<f32>;
 @group(0) @binding(2) var<storage, read_write> gradients: array<f32>;
 @group(0) @binding(3) var<uniform> parameters: Parameters;
@@ -23,7 +22,5 @@ fn main(
     if (i >= parameters.count) {
         return;
     }
-    let x = places[i];
-    // 1 / sqrt(2 pi)
-    gradients[i] = upstream[i] * (0.39894228 * exponential(-0.5 * x * x));
+    gradients[i] = select(parameters.slope * upstream[i], upstream[i], outputs[i] > 0.0);
 }
