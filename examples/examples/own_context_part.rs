@@ -49,9 +49,11 @@ impl PriorPart for ProfileAlongX {
         if !Self::applies(planes.layout(), plane) {
             return None;
         }
-        let [channels, height, width] = planes.planes[plane].dims();
+        let [height, width] = planes.layout().planes()[plane].size;
         // xy is [M, y, x]. Its mean over the rows is spread over the rows of xz, [M, z, x].
-        let profile = planes.in_same_scale(plane, PlaneAxes::Xy)?.mean_dim(1).expand([channels, height, width]);
+        let profile = planes.in_same_scale(plane, PlaneAxes::Xy)?.mean_dim(1);
+        let channels = profile.dims()[0];
+        let profile = profile.expand([channels, height, width]);
         let parameters = Some(self.conv.forward(profile));
         Some(Prior { parameters, context: None, passes: Passes::AnchorsFirst, latent_bits: None })
     }

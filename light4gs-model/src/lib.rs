@@ -89,6 +89,7 @@ mod sensitivity;
 pub mod sh;
 mod significance;
 mod splatter;
+mod tape;
 
 pub use attribute_entropy::{AttributeEntropy, ChannelPrediction, CodedAttribute, GaussianPlaces};
 pub use backdrop::Backdrop;

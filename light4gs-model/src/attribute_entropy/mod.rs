@@ -22,6 +22,7 @@ use crate::ops::neighborhoods::{Neighborhoods, neighborhoods};
 use crate::ops::uniform_noise::{NoiseDraw, add_uniform_noise};
 use crate::scene::attributes::{Attribute, MEANS};
 use crate::scene::{AttributeMapper, GaussianTensors};
+use crate::tape::{off_tape, untracked};
 pub use prediction::ChannelPrediction;
 use prediction::neighbors_of;
 
@@ -342,16 +343,6 @@ fn has_density(attribute: &str) -> bool {
 fn size_of(gaussians: &GaussianTensors) -> f32 {
     let numbers: Vec<f32> = gaussians.log_scales.clone().into_data().iter().collect();
     typical_size(numbers.as_chunks().0)
-}
-
-/// The same values as constants of later operations.
-fn untracked<const D: usize>(values: Tensor<D>) -> Tensor<D> {
-    if values.device().is_autodiff() { values.set_require_grad(false) } else { values }
-}
-
-/// The same values on the back end below autodiff.
-fn off_tape<const D: usize>(values: Tensor<D>) -> Tensor<D> {
-    if values.device().is_autodiff() { values.inner() } else { values }
 }
 
 /// A new value for a parameter, which is trained as before.

@@ -86,7 +86,7 @@ impl InterPlane {
 impl PriorPart for InterPlane {
     /// Applies to space-only planes, if the planes over their axes and time exist ([`PlaneLayout::over_time`]).
     fn prior(&self, planes: &CenteredPlanes, plane: usize, _: Latent) -> Option<Prior> {
-        let [over_a, over_b] = planes.layout().over_time(plane)?.map(|source| planes.planes[source].clone());
+        let [over_a, over_b] = planes.layout().over_time(plane)?.map(|source| planes.plane(source));
         let parameters = Some(self.forward(over_a, over_b));
         Some(Prior { parameters, context: None, passes: Passes::AnchorsFirst, latent_bits: None })
     }

@@ -63,8 +63,7 @@ impl InterScale {
 
     fn contribution(&self, planes: &CenteredPlanes, plane: usize) -> Option<Tensor<3>> {
         let lower = planes.one_scale_below(plane)?;
-        let [_, height, width] = planes.planes[plane].dims();
-        Some(self.forward(lower, [height, width]))
+        Some(self.forward(lower, planes.layout().planes()[plane].size))
     }
 }
 

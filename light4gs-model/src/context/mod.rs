@@ -230,7 +230,7 @@ impl ContextModelConfig {
 /// let hexplane = HexPlaneConfig { channels: 8, resolution: [8, 8, 8, 4], ..Default::default() }.init(&device);
 /// let model = ContextModelConfig::compact(8).init(&device);
 /// let steps = PlaneSteps::fixed(&[0.1; 12], &device);
-/// let rates = model.rate(&steps.add_noise(&hexplane.tensors()), &steps, &[2, 6], Latent::Noise);
+/// let rates = model.rate(&steps.add_noise(&hexplane.tensors(), 7), &steps, &[2, 6], Latent::Noise);
 /// // A space-time plane of the lowest scale has a hyperprior, a plane above has none.
 /// assert!(rates[0].latent_bits.is_some() && rates[1].latent_bits.is_none());
 /// ```

@@ -8,22 +8,48 @@ use crate::entropy::bottleneck::Latent;
 use crate::entropy::quantization_steps::PlaneSteps;
 use crate::planes::PlaneTensors;
 
-/// All planes `[M, H, W]` of a field with their groups' centers subtracted, and their steps.
+/// All planes `[M, H, W]` of a field, their centers, which are subtracted when a plane is asked for, and their steps.
 ///
 /// Planes that are coded before are given as decoded, or, in training, with noise. Only a hyperprior reads the plane
 /// that is being coded, since its latent is transmitted.
 #[derive(Clone, Debug)]
 pub struct CenteredPlanes {
-    /// `[M, H, W]`, original units, with the center subtracted.
-    pub planes: PlaneTensors,
-    /// One for each plane.
-    pub steps: PlaneSteps,
+    planes: PlaneTensors,
+    centers: Vec<f64>,
+    steps: PlaneSteps,
 }
 
 impl CenteredPlanes {
+    /// Planes in original units, the center of each, and their steps.
+    ///
+    /// # Panics
+    /// If there is not one center for each plane.
+    pub fn new(planes: PlaneTensors, centers: Vec<f64>, steps: PlaneSteps) -> Self {
+        assert_eq!(centers.len(), planes.len(), "a center for each plane");
+        Self { planes, centers, steps }
+    }
+
+    /// A plane with its center subtracted, `[M, H, W]`, original units.
+    pub fn plane(&self, plane: usize) -> Tensor<3> {
+        let values = self.planes[plane].clone();
+        // Subtracting nothing would be a launch on a GPU.
+        if self.centers[plane] == 0.0 { values } else { values - self.centers[plane] }
+    }
+
+    /// Replaces a plane by values with the center subtracted.
+    pub(super) fn set(&mut self, plane: usize, centered: Tensor<3>) {
+        self.planes.set(plane, centered);
+        self.centers[plane] = 0.0;
+    }
+
+    /// The planes' steps.
+    pub fn steps(&self) -> &PlaneSteps {
+        &self.steps
+    }
+
     /// A plane in units of its step, `[M, H, W]`.
     pub fn in_steps(&self, plane: usize) -> Tensor<3> {
-        self.planes[plane].clone() / self.steps.broadcast(plane)
+        self.plane(plane) / self.steps.broadcast(plane)
     }
 
     /// The layout of the planes.
@@ -34,13 +60,13 @@ impl CenteredPlanes {
     /// The plane `[M, h, w]` over the same axes one scale below, if there is one, in original units with the center
     /// subtracted.
     pub fn one_scale_below(&self, plane: usize) -> Option<Tensor<3>> {
-        Some(self.planes[self.layout().one_scale_below(plane)?].clone())
+        Some(self.plane(self.layout().one_scale_below(plane)?))
     }
 
     /// The plane `[M, H, W]` over other axes in the same scale as `plane`, if there is one, in original units with the center
     /// subtracted.
     pub fn in_same_scale(&self, plane: usize, axes: PlaneAxes) -> Option<Tensor<3>> {
-        Some(self.planes[self.layout().in_same_scale(plane, axes)?].clone())
+        Some(self.plane(self.layout().in_same_scale(plane, axes)?))
     }
 }
 

@@ -51,8 +51,8 @@ impl ContextModel {
 
     /// From planes in original units to the input of the parts.
     pub fn centered(&self, planes: &PlaneTensors, steps: &PlaneSteps) -> CenteredPlanes {
-        let planes = planes.map(|place, plane| plane - self.center_of(planes.layout().planes()[place].axes));
-        CenteredPlanes { planes, steps: steps.clone() }
+        let centers = planes.layout().planes().iter().map(|plane| self.center_of(plane.axes)).collect();
+        CenteredPlanes::new(planes.clone(), centers, steps.clone())
     }
 
     /// Bits of a plane under a composition of parts.
@@ -78,7 +78,7 @@ impl ContextModel {
     ) -> (NormalParameters<3>, Option<Tensor<1>>) {
         let prior = prior_of(parts, planes, plane, latent);
         let latent_bits = prior.latent_bits.clone();
-        (self.gaussians(prior, &planes.planes[plane]), latent_bits)
+        (self.gaussians(prior, planes, plane), latent_bits)
     }
 
     /// `[H, W]`: the bits of a plane's values under a composition of parts, summed over channels.
@@ -101,7 +101,7 @@ impl ContextModel {
         steps: &PlaneSteps,
     ) -> Vec<Option<Tensor<3>>> {
         let planes = self.centered(planes, steps);
-        let symbols = (0..planes.planes.len()).map(|plane| {
+        let symbols = (0..planes.layout().len()).map(|plane| {
             let has_latent = prior_of(parts, &planes, plane, Latent::Rounded).latent_bits.is_some();
             let hyperprior = self.hyperprior.as_ref().filter(|_| has_latent)?;
             Some(hyperprior.symbols(planes.in_steps(plane)))
@@ -117,8 +117,7 @@ impl ContextModel {
         planes: &PlaneTensors,
         steps: &PlaneSteps,
     ) -> Vec<QuantizedPlane> {
-        let mut known = self.centered(planes, steps);
-        known.planes = known.planes.map(|_, plane| plane.detach());
+        let mut known = self.centered(&planes.map(|_, plane| plane.detach()), steps);
         let mut quantized: Vec<Option<QuantizedPlane>> = vec![None; planes.len()];
         for plane in planes.layout().coding_order() {
             let step = steps.broadcast(plane).detach();
@@ -130,16 +129,16 @@ impl ContextModel {
                 // The checkerboard reads only anchors.
                 let [_, height, width] = values.dims();
                 let anchors = Prior { passes: Passes::One, ..prior.clone() };
-                let anchors = round(self.gaussians(anchors, &values).means);
+                let anchors = round(self.gaussians(anchors, &known, plane).means);
                 let mask = anchor_mask([height, width], &values.device());
-                known.planes.set(plane, anchors * mask);
+                known.set(plane, anchors * mask);
             }
-            let gaussians = self.gaussians(prior, &known.planes[plane]);
+            let gaussians = self.gaussians(prior, &known, plane);
             let symbols = (values - gaussians.means.clone()).round();
             let received = symbols.clone() + gaussians.means.clone();
             let decoded = received.clone() * step;
             let rate = PlaneRate { plane, values_bits: value_bits(received, gaussians).sum(), latent_bits };
-            known.planes.set(plane, decoded.clone());
+            known.set(plane, decoded.clone());
             let decoded = decoded + self.center_of(planes.layout().planes()[plane].axes);
             quantized[plane] = Some(QuantizedPlane { decoded, symbols, rate });
         }
@@ -180,10 +179,10 @@ impl ContextModel {
         }
     }
 
-    fn gaussians(&self, prior: Prior, plane: &Tensor<3>) -> NormalParameters<3> {
-        let [_, height, width] = plane.dims();
+    fn gaussians(&self, prior: Prior, planes: &CenteredPlanes, plane: usize) -> NormalParameters<3> {
+        let [height, width] = planes.layout().planes()[plane].size;
         let context = match (&self.checkerboard, prior.passes) {
-            (Some(checkerboard), Passes::AnchorsFirst) => Some(checkerboard.context(plane.clone())),
+            (Some(checkerboard), Passes::AnchorsFirst) => Some(checkerboard.context(planes.plane(plane))),
             _ => prior.context,
         };
         self.entropy_parameters.forward(prior.parameters, context, [height, width])

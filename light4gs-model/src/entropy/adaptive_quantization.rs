@@ -3,9 +3,14 @@
 use burn::module::{Module, Param};
 use burn::tensor::{Device, Tensor};
 use light4gs_codec::plane_layout::{PlaneLayout, PlaneShape};
-use light4gs_keys::keys;
+use light4gs_keys::{Bounds, keys};
 
 use super::quantization_steps::{PlaneSteps, QUANTIZATION_STEP};
+
+const COARSEST: f64 = match QUANTIZATION_STEP {
+    Bounds::Number { most, .. } => most,
+    _ => panic!("the bounds of a number"),
+};
 
 keys! {
     /// The initial steps of an [`AdaptiveQuantization`].
@@ -72,18 +77,18 @@ impl AdaptiveQuantization {
         self.steps_of(self.log_steps.val().set_require_grad(false))
     }
 
-    /// Resets steps that have become finer than the initial ones of `config` to those.
+    /// Resets steps that have become finer than the initial ones of `config` to those, and steps coarser than
+    /// [`QUANTIZATION_STEP`] allows to the coarsest that it does.
     pub fn no_finer_than(&mut self, config: &AdaptiveQuantizationConfig) {
         let log_steps = self.log_steps.val().inner();
         let initial = config.log_steps(&log_steps.device());
-        let value = Tensor::from_inner(log_steps.max_pair(initial));
+        let value = Tensor::from_inner(log_steps.max_pair(initial).clamp_max(COARSEST.ln()));
         let learns = self.log_steps.is_require_grad();
         self.log_steps = Param::initialized(self.log_steps.id, value.set_require_grad(learns));
     }
 
     fn steps_of(&self, log_steps: Tensor<1>) -> PlaneSteps {
-        let steps = log_steps.exp();
-        let of_plane = |plane: &PlaneShape| steps.clone().narrow(0, usize::from(plane.axes.is_space_time()), 1);
-        PlaneSteps::new(self.layout.planes().iter().map(of_plane).collect())
+        let place = |plane: &PlaneShape| usize::from(plane.axes.is_space_time());
+        PlaneSteps::shared(log_steps.exp(), self.layout.planes().iter().map(place).collect())
     }
 }

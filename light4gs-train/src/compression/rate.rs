@@ -1,7 +1,7 @@
 //! Noise in place of rounding, and the file size that the noisy values estimate (paper III-C, IV-B).
 
 use burn::module::Param;
-use burn::tensor::{Gradients, Int, Tensor, TensorData};
+use burn::tensor::{Int, Tensor, TensorData};
 use light4gs_model::parameters::on_a_new_tape;
 use light4gs_model::{
     Attribute, AttributeMapper, BuiltInField, DeformationField, DynamicScene, FeaturePlanes, GaussianPlaces, Latent,
@@ -16,7 +16,8 @@ use super::{Compression, ShModel};
 #[derive(Clone, Debug)]
 pub struct NoisyScene<F: DeformationField = BuiltInField> {
     /// Its parameters begin a new tape. Gradients with respect to its planes and spherical harmonics are those of the
-    /// scene's, since noise is only added to them; for the steps see [`NoisyScene::step_gradients`].
+    /// scene's, since noise is only added to them; those of the steps
+    /// lack the part through the noise.
     pub scene: DynamicScene<F>,
     /// Steps of the planes; they begin a new tape where they are learned. `None` if there are no planes, or if they are
     /// frozen: then they have the file's values, without noise, without gradient, and are not in the rate.
@@ -68,8 +69,8 @@ impl Rate {
 
 impl<C: PlaneEntropy, S: ShModel> Compression<C, S> {
     /// The scene with uniform noise as wide as the steps. With `learn_steps` the steps get gradients; with
-    /// `with_gaussians` the Gaussians have noise too, in the attributes that have an entropy model. The noise of planes and of
-    /// harmonics with a model of their own is from the device's generator, that of the other attributes from `seed`.
+    /// `with_gaussians` the Gaussians have noise too, in the attributes that have an entropy model. The noise is from
+    /// `seed`; that of harmonics with a model of their own is from the device's generator.
     pub fn noisy<F: DeformationField>(
         &self,
         scene: &DynamicScene<F>,
@@ -81,7 +82,7 @@ impl<C: PlaneEntropy, S: ShModel> Compression<C, S> {
         let steps = match (&self.planes, noisy.planes_mut()) {
             (Some(models), Some(planes)) => {
                 let steps = models.quantization.steps_without_gradient();
-                let noisy = steps.add_noise(&planes.tensors().map(|_, plane| plane.set_require_grad(false)));
+                let noisy = steps.add_noise(&planes.tensors(), seed);
                 for (parameter, plane) in planes.planes.iter_mut().zip(noisy.into_tensors()) {
                     replace(parameter, plane);
                 }
@@ -192,16 +193,9 @@ impl<F: DeformationField> NoisyScene<F> {
         apart
     }
 
-    /// Whether the steps are learned.
-    pub fn learns_steps(&self) -> bool {
-        self.steps.as_ref().is_some_and(|steps| steps.of(0).is_require_grad())
-    }
-
-    /// The gradients of a backward pass for the steps, each `[1]`, without the part through the noise. `None` for steps
-    /// that are not learned, and for those on which the loss does not depend.
-    pub fn step_gradients(&self, gradients: &Gradients) -> Vec<Option<Tensor<1>>> {
-        let planes = 0..self.scene.planes().map_or(0, |planes| planes.planes.len());
-        planes.map(|plane| self.steps.as_ref()?.of(plane).grad(gradients)).collect()
+    /// The steps, if they are learned.
+    pub fn learned_steps(&self) -> Option<&PlaneSteps> {
+        self.steps.as_ref().filter(|steps| steps.steps().is_require_grad())
     }
 }
 

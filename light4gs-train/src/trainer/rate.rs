@@ -25,8 +25,8 @@ pub(super) struct RateTerm {
     value: Tensor<1>,
     /// With respect to the noisy scene's parameters and those of the entropy models.
     gradients: GradientSums,
-    /// With respect to the step of each plane, without the part through the noise.
-    steps: Vec<Option<Tensor<1>>>,
+    /// With respect to the steps, `[S]`, without the part through the noise.
+    steps: Option<Tensor<1>>,
 }
 
 impl<F: DeformationField, E: EntropyModels> Trainer<F, E> {
@@ -125,7 +125,7 @@ impl<F: DeformationField, E: EntropyModels> Trainer<F, E> {
         let term = term * self.state.rate_weight;
         let value = term.clone().inner();
         let mut tape = term.backward();
-        let steps = noisy.step_gradients(&tape);
+        let steps = noisy.learned_steps().and_then(|steps| steps.steps().grad(&tape));
         let mut gradients = GradientSums::default();
         gradients.add_module(&noisy.scene, &mut tape);
         gradients.add_module(compression, &mut tape);
@@ -144,15 +144,17 @@ impl<F: DeformationField, E: EntropyModels> Trainer<F, E> {
     ) -> Option<Tensor<1>> {
         let with_gaussians = self.gaussian_rate_is_active(iteration);
         let compression = self.state.compression.as_ref()?;
-        let (value, steps) = match rate {
+        let (value, by_steps) = match rate {
             Some(rate) => {
                 gradients.add(rate.gradients);
                 (Some(rate.value), rate.steps)
             }
-            None => (None, vec![None; noisy.scene.planes().map_or(0, |hexplane| hexplane.planes.len())]),
+            None => (None, None),
         };
-        if let Some(term) = steps_term(noisy, &self.state.scene, compression, steps, gradients) {
-            gradients.add_module(compression, &mut term.backward());
+        if let Some((log_steps, gradient)) =
+            gradient_of_steps(noisy, &self.state.scene, compression, by_steps, gradients)
+        {
+            gradients.add_one(log_steps, gradient);
         }
         if let Some(attributes) = compression.attributes.as_ref().filter(|_| with_gaussians)
             && let Some(gradient) = gradient_through_noise(noisy, &self.state.scene, attributes, gradients)
@@ -164,34 +166,28 @@ impl<F: DeformationField, E: EntropyModels> Trainer<F, E> {
     }
 }
 
-/// A term with the whole gradient of the steps: that of the rate (`direct`, by plane), plus that through the noisy planes,
-/// `Σ noise / step · gradient of the noisy plane`. `None` if no step is learned.
-fn steps_term<F: DeformationField, C: Module, S: Module>(
+/// The logarithms of the planes' steps and their whole gradient, `[S]`: that of the rate by the steps (`direct`), and that through the
+/// noisy planes. `gradients` are those of views and rate. `None` if no step is learned.
+fn gradient_of_steps<F: DeformationField, C: Module, S: Module>(
     noisy: &NoisyScene<F>,
     scene: &DynamicScene<F>,
     compression: &Compression<C, S>,
-    direct: Vec<Option<Tensor<1>>>,
+    direct: Option<Tensor<1>>,
     gradients: &mut GradientSums,
-) -> Option<Tensor<1>> {
-    if !noisy.learns_steps() {
-        return None;
-    }
-    let steps = compression.planes.as_ref()?.quantization.steps();
+) -> Option<(ParamId, Tensor<1>)> {
+    let steps = noisy.learned_steps()?;
+    let log_steps = compression.planes.as_ref()?.quantization.log_steps.id;
     let planes = &scene.planes()?.planes;
     let identities: Vec<ParamId> = planes.iter().map(|plane| plane.id).collect();
-    let found = gradients.get(&identities).into_iter().zip(direct);
-    let planes = planes.iter().zip(&noisy.scene.planes()?.planes).zip(found).enumerate();
-    let terms = planes.map(|(i, ((plane, noisy), (gradient, direct)))| {
-        let step = steps.of(i);
-        let through_noise = gradient.map(|gradient| {
-            let noise = (noisy.val().inner() - plane.val().inner()).flatten::<1>(0, 2);
-            (noise * gradient).sum() / step.clone().inner()
-        });
-        // Every plane's step is on the tape, so every plane must have a term: see `steps_without_gradient`.
-        let gradient = [direct, through_noise].into_iter().flatten().reduce(|sum, part| sum + part);
-        step.clone() * Tensor::from_inner(gradient.unwrap_or_else(|| step.inner().zeros_like()))
+    let found = gradients.get(&identities);
+    let flat = |plane: &Param<Tensor<3>>| plane.val().inner().reshape([-1]);
+    let values = planes.iter().zip(&noisy.scene.planes()?.planes).zip(found).map(|((exact, noisy), gradient)| {
+        Some(NoisyValues { noisy: flat(noisy), exact: flat(exact), gradient: gradient? })
     });
-    terms.reduce(|sum, term| sum + term)
+    let through_noise = noise_gradient(values.collect()).map(|of_planes| steps.sums_over_planes(of_planes));
+    let direct = direct.map(|gradient| gradient * steps.steps().inner());
+    let gradient = [direct, through_noise].into_iter().flatten().reduce(|sum, part| sum + part)?;
+    Some((log_steps, gradient))
 }
 
 /// The gradient of the logarithms of the attributes' steps through the noise, `[A]`. `gradients` are those of views and rate.
@@ -300,11 +296,12 @@ mod tests {
 
         let leaves = noisy.steps.clone().unwrap();
         let mut tape = loss(&noisy.scene.planes().unwrap().tensors(), &|i| leaves.of(i)).backward();
-        let direct = noisy.step_gradients(&tape);
+        let direct = leaves.steps().grad(&tape);
         let mut apart = GradientSums::default();
         apart.add_module(&noisy.scene, &mut tape);
-        let term = steps_term(&noisy, &scene, &compression, direct, &mut apart).unwrap();
-        apart.add_module(&compression, &mut term.backward());
+        let (found, gradient) = gradient_of_steps(&noisy, &scene, &compression, direct, &mut apart).unwrap();
+        assert_eq!(found, log_steps);
+        apart.add_one(found, gradient);
 
         let steps = quantization.steps();
         let noisy = noisy.scene.planes().unwrap().tensors();

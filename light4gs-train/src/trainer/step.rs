@@ -105,7 +105,7 @@ impl<F: DeformationField, E: EntropyModels> Trainer<F, E> {
         modules.extend(compression.as_mut().map(|compression| (COMPRESSION, compression as _)));
         adam.step_modules(&mut modules, &mut gradients, rate);
         if let Some(compression) = compression
-            && noisy.is_some_and(|noisy| noisy.learns_steps())
+            && noisy.is_some_and(|noisy| noisy.learned_steps().is_some())
         {
             compression.bound_steps(&self.config);
         }

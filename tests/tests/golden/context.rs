@@ -90,9 +90,9 @@ impl ReferenceInterPlane<'_> {
     }
 
     fn context(planes: &CenteredPlanes, plane: usize) -> Option<Tensor<3>> {
-        let [_, height, width] = planes.planes[plane].dims();
+        let [height, width] = planes.layout().planes()[plane].size;
         let sources = planes.layout().over_time(plane)?;
-        let maps = sources.map(|source| Self::spread(planes.planes[source].clone(), [height, width]));
+        let maps = sources.map(|source| Self::spread(planes.plane(source), [height, width]));
         let [first, second] = maps;
         Some((first + second) / 2.0)
     }
@@ -225,7 +225,7 @@ fn pieces() {
 
         let planes = model.centered(&planes_of(&golden, &device), &steps_of(&golden, &device));
         for plane in [0, 1, 3] {
-            let [a, b] = planes.layout().over_time(plane).unwrap().map(|source| planes.planes[source].clone());
+            let [a, b] = planes.layout().over_time(plane).unwrap().map(|source| planes.plane(source));
             check(&format!("interplane_paper.{plane}"), &InterPlane::context(a, b));
             let reference = ReferenceInterPlane::context(&planes, plane).unwrap();
             check(&format!("interplane_ref.{plane}"), &reference);
@@ -249,7 +249,7 @@ fn trace_of_a_space_time_plane() {
         check("z", &z);
         let parameters = hyperprior.synthesize(z);
         check("params_base", &parameters);
-        let plane = planes.planes[2].clone();
+        let plane = planes.plane(2);
         let [_, height, width] = plane.dims();
         let conv = &model.checkerboard.as_ref().unwrap().conv;
         check("ctx_params", &conv.forward(plane.clone() * anchor_mask([height, width], &device)));
@@ -312,7 +312,7 @@ fn eval() {
         let planes = model.centered(&planes_of(&golden, &device), &steps_of(&golden, &device));
         let parts = parts(&model);
         let mut total = 0.0;
-        for plane in 0..planes.planes.len() {
+        for plane in 0..planes.layout().len() {
             let (gaussians, hyper) = model.parameters_with(&parts, &planes, plane, Latent::Rounded);
             let rounded = (planes.in_steps(plane) - gaussians.means.clone()).round() + gaussians.means.clone();
             let likelihood = gaussian_likelihood(rounded, gaussians);

@@ -197,19 +197,12 @@ fn learned_steps_have_a_gradient() {
         let mut model = ContextModelConfig::compact(CHANNELS).init(&device);
         model.start_from(&planes, &quantization.steps());
         let steps = quantization.steps();
-        let noisy = steps.add_noise(&planes);
+        let noisy = steps.add_noise(&planes, 1);
         let rates = model.rate(&noisy, &steps, &all_planes(), Latent::Noise);
         let bits = rates.into_iter().map(|rate| rate.total()).reduce(|sum, bits| sum + bits).unwrap();
         let gradient = values_of(&quantization.log_steps.val().grad(&bits.backward()).unwrap());
         assert_eq!(gradient.len(), 2);
         assert!(gradient.iter().all(|g| *g < 0.0), "{name}: {gradient:?}");
-
-        // A backward pass consumes its tape.
-        let noisy = quantization.steps().add_noise(&planes);
-        let error = (noisy[0].clone() - planes[0].clone()).powi_scalar(2).sum();
-        let gradient = values_of(&quantization.log_steps.val().grad(&error.clone().backward()).unwrap());
-        // The error grows with the square of the step.
-        assert_close_relative(name, &gradient, &[2.0 * values_of(&error)[0], 0.0], 1e-3);
     }
 }
 
@@ -221,12 +214,13 @@ fn steps_no_finer_than_they_began() {
         let config = AdaptiveQuantizationConfig { space_only: 0.05, space_time: 0.2 };
         let mut quantization = config.init(&layout, &device);
         let began = values_of(&quantization.log_steps.val());
-        for steps in [[0.04f32, 0.3], [0.06, 0.1]] {
+        for steps in [[0.04f32, 0.3], [0.06, 0.1], [0.05, f32::MAX]] {
             let learned = Tensor::from_floats(steps, &device).log().require_grad();
             quantization.log_steps = Param::initialized(quantization.log_steps.id, learned.clone());
             quantization.no_finer_than(&config);
             let (bounded, learned) = (values_of(&quantization.log_steps.val()), values_of(&learned));
-            assert_eq!(bounded, [0, 1].map(|at| f32::max(began[at], learned[at])), "{name}");
+            let coarsest = 1000f32.ln();
+            assert_eq!(bounded, [0, 1].map(|at| learned[at].clamp(began[at], coarsest)), "{name}");
             assert!(quantization.log_steps.val().is_require_grad(), "{name}: they go on learning");
         }
     }
@@ -256,17 +250,17 @@ fn training_lowers_the_rate() {
     let steps = PlaneSteps::fixed(&[0.05; PLANES], &device);
     let mut model = ContextModelConfig::compact(CHANNELS).init(&device);
     model.start_from(&planes, &steps);
-    let total = |model: &ContextModel, selection: &[usize]| {
-        let rates = model.rate(&steps.add_noise(&planes), &steps, selection, Latent::Noise);
+    let total = |model: &ContextModel, selection: &[usize], seed: u64| {
+        let rates = model.rate(&steps.add_noise(&planes, seed), &steps, selection, Latent::Noise);
         rates.into_iter().map(|rate| rate.total()).reduce(|sum, bits| sum + bits).unwrap()
     };
-    let at_first = values_of(&total(&model, &all_planes()))[0];
+    let at_first = values_of(&total(&model, &all_planes(), 0))[0];
     let mut optimizer = AdamConfig::new().init();
     for step in 0..500 {
         let selection: Vec<usize> = all_planes().into_iter().filter(|plane| (plane + step) % 3 == 0).collect();
-        let gradients = GradientsParams::from_grads(total(&model, &selection).backward(), &model);
+        let gradients = GradientsParams::from_grads(total(&model, &selection, step as u64).backward(), &model);
         model = optimizer.step(5e-3, model, gradients);
     }
-    let at_last = values_of(&total(&model, &all_planes()))[0];
+    let at_last = values_of(&total(&model, &all_planes(), 0))[0];
     assert!(at_last < 0.85 * at_first, "{at_first} bits at first, {at_last} at last");
 }
