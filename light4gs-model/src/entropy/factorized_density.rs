@@ -1,17 +1,21 @@
 //! A learned density for each channel (Ballé et al. 2018, appendix 6.1): a small monotone network gives the logit of the
 //! distribution function.
 
+use std::ops::Range;
+
 use burn::config::Config;
 use burn::module::{Module, Param};
 use burn::tensor::activation::softplus;
 use burn::tensor::{Device, Distribution, Tensor};
+
+use crate::ops::density_likelihood::{DensityLayer, DensityShape, density_likelihood};
 
 /// Configuration of a [`FactorizedDensity`].
 #[derive(Config, Debug)]
 pub struct FactorizedDensityConfig {
     /// Channels, each with its own density.
     pub channels: usize,
-    /// Widths of the hidden layers.
+    /// Widths of the hidden layers: at most four, each of width 1 to 3.
     #[config(default = "vec![3, 3, 3, 3]")]
     pub filters: Vec<usize>,
     /// The density is initially about this wide on either side of zero.
@@ -24,22 +28,22 @@ pub struct FactorizedDensityConfig {
 
 impl FactorizedDensityConfig {
     /// CompressAI's initial values: biases uniform in ±0.5, everything else fixed.
+    ///
+    /// # Panics
+    /// If there are more hidden layers, or wider ones, than [`Self::filters`] allows.
     pub fn init(&self, device: &Device) -> FactorizedDensity {
         let channels = self.channels;
-        let widths: Vec<usize> = [1].into_iter().chain(self.filters.iter().copied()).chain([1]).collect();
-        let layers = widths.len() - 1;
-        let gain = self.initial_scale.powf(1.0 / layers as f64).recip();
-        let matrices = widths.windows(2).map(|pair| {
-            let value = (gain / pair[1] as f64).exp_m1().ln();
-            Param::from_tensor(Tensor::full([channels, pair[1], pair[0]], value, device))
+        let shape = DensityShape::new(&self.filters, self.bend_last_layer);
+        let gain = self.initial_scale.powf(1.0 / shape.layers().len() as f64).recip();
+        let parameters = shape.layers().iter().flat_map(|layer| {
+            let value = (gain / layer.outputs as f64).exp_m1().ln();
+            let matrix = Tensor::full([channels, layer.matrix().len()], value, device);
+            let bias = Tensor::random([channels, layer.outputs], Distribution::Uniform(-0.5, 0.5), device);
+            let factor = layer.factor().map(|places| Tensor::zeros([channels, places.len()], device));
+            [matrix, bias].into_iter().chain(factor)
         });
-        let biases = widths[1..].iter().map(|width| {
-            Param::from_tensor(Tensor::random([channels, *width, 1], Distribution::Uniform(-0.5, 0.5), device))
-        });
-        let bent = if self.bend_last_layer { layers } else { layers - 1 };
-        let factors =
-            widths[1..=bent].iter().map(|width| Param::from_tensor(Tensor::zeros([channels, *width, 1], device)));
-        FactorizedDensity { matrices: matrices.collect(), biases: biases.collect(), factors: factors.collect() }
+        let parameters = Tensor::cat(parameters.collect(), 1);
+        FactorizedDensity { parameters: Param::from_tensor(parameters), shape }
     }
 }
 
@@ -48,36 +52,58 @@ impl FactorizedDensityConfig {
 /// `sigmoid(l)` is a distribution function.
 #[derive(Module, Debug)]
 pub struct FactorizedDensity {
-    /// `[C, out, in]` for each layer, through softplus.
-    pub matrices: Vec<Param<Tensor<3>>>,
-    /// `[C, out, 1]` for each layer.
-    pub biases: Vec<Param<Tensor<3>>>,
-    /// `[C, out, 1]` for each layer, through tanh; the last layer may have none.
-    pub factors: Vec<Param<Tensor<3>>>,
+    /// `[C, P]`: for each channel the matrix, the bias and the factor of each layer, as [`Self::shape`] says. They are one
+    /// parameter, so that a GPU takes one launch for all of them.
+    pub parameters: Param<Tensor<2>>,
+    #[module(skip)]
+    shape: DensityShape,
 }
 
 impl FactorizedDensity {
     /// Number of channels.
     pub fn channels(&self) -> usize {
-        self.matrices[0].dims()[0]
+        self.parameters.dims()[0]
+    }
+
+    /// The layers, and where the parameters of each stand.
+    pub fn shape(&self) -> &DensityShape {
+        &self.shape
+    }
+
+    /// `[C, out, in]` for each layer, which goes through softplus.
+    pub fn matrices(&self) -> Vec<Tensor<3>> {
+        let parameters = self.parameters.val();
+        self.shape.layers().iter().map(|layer| matrix_of(&parameters, layer)).collect()
+    }
+
+    /// `[C, out, 1]` for each layer.
+    pub fn biases(&self) -> Vec<Tensor<3>> {
+        let parameters = self.parameters.val();
+        self.shape.layers().iter().map(|layer| bias_of(&parameters, layer)).collect()
+    }
+
+    /// `[C, out, 1]` for each layer that bends, which goes through tanh; the last layer may have none.
+    pub fn factors(&self) -> Vec<Tensor<3>> {
+        let parameters = self.parameters.val();
+        self.shape.layers().iter().filter_map(|layer| factor_of(&parameters, layer)).collect()
     }
 
     /// Logits of the distribution functions at `x [C, N]`: `[C, N]`.
     pub fn logits(&self, x: Tensor<2>) -> Tensor<2> {
-        self.logits_with(x, |parameter| parameter.val())
+        self.logits_with(x, &self.parameters.val())
     }
 
     /// [`Self::logits`] `[C, N]` at `x [C, N]`, without gradients to the density's own parameters.
     pub fn logits_of_frozen(&self, x: Tensor<2>) -> Tensor<2> {
-        self.logits_with(x, |parameter| parameter.val().set_require_grad(false))
+        self.logits_with(x, &self.parameters.val().set_require_grad(false))
     }
 
-    fn logits_with(&self, x: Tensor<2>, value: impl Fn(&Param<Tensor<3>>) -> Tensor<3>) -> Tensor<2> {
+    fn logits_with(&self, x: Tensor<2>, parameters: &Tensor<2>) -> Tensor<2> {
         let mut logits: Tensor<3> = x.unsqueeze_dim(1);
-        for (i, (matrix, bias)) in self.matrices.iter().zip(&self.biases).enumerate() {
-            logits = mixed(softplus(value(matrix), 1.0), logits) + value(bias);
-            if let Some(factor) = self.factors.get(i) {
-                logits = logits.clone() + value(factor).tanh() * tanh(logits);
+        for layer in self.shape.layers() {
+            logits = mixed(softplus(matrix_of(parameters, layer), 1.0), logits) + bias_of(parameters, layer);
+            if let Some(factor) = factor_of(parameters, layer) {
+                logits = logits.clone() + factor.tanh() * tanh(logits);
             }
         }
         logits.squeeze_dim(1)
@@ -85,24 +111,35 @@ impl FactorizedDensity {
 
     /// Probability of the interval of this width around each of `x [C, N]`: `[C, N]`, without a lower bound.
     pub fn interval_likelihood(&self, x: Tensor<2>, width: f32) -> Tensor<2> {
-        let count = x.dims()[1];
-        let edges = Tensor::cat(vec![x.clone() - width / 2.0, x + width / 2.0], 1);
-        let edges = self.logits(edges);
-        let lower = edges.clone().narrow(1, 0, count);
-        let upper = edges.narrow(1, count, count);
-        logistic_interval(lower, upper)
+        density_likelihood(x, self.parameters.val(), &self.shape, width)
     }
 
     /// The same densities in float64 on the host.
     pub fn to_plain(&self) -> PlainDensity {
-        let host = |parameters: &[Param<Tensor<3>>]| parameters.iter().map(PlainParameter::new).collect();
         PlainDensity {
-            matrices: host(&self.matrices),
-            biases: host(&self.biases),
-            factors: host(&self.factors),
+            parameters: self.parameters.val().into_data().iter::<f64>().collect(),
+            shape: self.shape.clone(),
             channels: self.channels(),
         }
     }
+}
+
+/// `[C, rows, columns]`: what stands in these places of the rows of `parameters [C, P]`.
+fn part(parameters: &Tensor<2>, places: Range<usize>, [rows, columns]: [usize; 2]) -> Tensor<3> {
+    let channels = parameters.dims()[0];
+    parameters.clone().narrow(1, places.start, places.len()).reshape([channels, rows, columns])
+}
+
+fn matrix_of(parameters: &Tensor<2>, layer: &DensityLayer) -> Tensor<3> {
+    part(parameters, layer.matrix(), [layer.outputs, layer.inputs])
+}
+
+fn bias_of(parameters: &Tensor<2>, layer: &DensityLayer) -> Tensor<3> {
+    part(parameters, layer.bias(), [layer.outputs, 1])
+}
+
+fn factor_of(parameters: &Tensor<2>, layer: &DensityLayer) -> Option<Tensor<3>> {
+    layer.factor().map(|places| part(parameters, places, [layer.outputs, 1]))
 }
 
 /// `sigmoid(upper) - sigmoid(lower)`, computed on the side of zero where the sigmoids are small and so have full
@@ -133,31 +170,12 @@ fn sigmoid<const D: usize>(x: Tensor<D>) -> Tensor<D> {
     (x.clamp_min(-60.0).neg().exp() + 1.0).recip()
 }
 
-#[derive(Clone, Debug)]
-struct PlainParameter {
-    values: Vec<f64>,
-    /// A channel's rows and columns.
-    shape: [usize; 2],
-}
-
-impl PlainParameter {
-    fn new(parameter: &Param<Tensor<3>>) -> Self {
-        let [_, rows, columns] = parameter.dims();
-        Self { values: parameter.val().into_data().iter::<f64>().collect(), shape: [rows, columns] }
-    }
-
-    fn at(&self, channel: usize, row: usize, column: usize) -> f64 {
-        let [rows, columns] = self.shape;
-        self.values[(channel * rows + row) * columns + column]
-    }
-}
-
 /// A [`FactorizedDensity`] in float64, without a back end, from which integer frequency tables are made.
 #[derive(Clone, Debug)]
 pub struct PlainDensity {
-    matrices: Vec<PlainParameter>,
-    biases: Vec<PlainParameter>,
-    factors: Vec<PlainParameter>,
+    /// `[C, P]`, row by row.
+    parameters: Vec<f64>,
+    shape: DensityShape,
     channels: usize,
 }
 
@@ -169,14 +187,17 @@ impl PlainDensity {
 
     /// Logit of a channel's distribution function at x.
     pub fn logit(&self, channel: usize, x: f64) -> f64 {
+        let parameters = &self.parameters[channel * self.shape.parameters()..(channel + 1) * self.shape.parameters()];
         let mut logits = vec![x];
-        for (i, (matrix, bias)) in self.matrices.iter().zip(&self.biases).enumerate() {
-            logits = (0..matrix.shape[0])
+        for layer in self.shape.layers() {
+            let (matrix, bias) = (&parameters[layer.matrix()], &parameters[layer.bias()]);
+            let factor = layer.factor().map(|places| &parameters[places]);
+            logits = (0..layer.outputs)
                 .map(|row| {
-                    let product =
-                        logits.iter().enumerate().map(|(k, l)| plain_softplus(matrix.at(channel, row, k)) * l);
-                    let logit = product.sum::<f64>() + bias.at(channel, row, 0);
-                    let bend = self.factors.get(i).map_or(0.0, |factor| factor.at(channel, row, 0).tanh());
+                    let weights = matrix[row * layer.inputs..].iter().map(|weight| plain_softplus(*weight));
+                    let product = weights.zip(&logits).map(|(weight, l)| weight * l);
+                    let logit = product.sum::<f64>() + bias[row];
+                    let bend = factor.map_or(0.0, |factor| factor[row].tanh());
                     logit + bend * logit.tanh()
                 })
                 .collect();

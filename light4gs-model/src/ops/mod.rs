@@ -19,6 +19,7 @@ pub mod activation;
 pub mod adam;
 pub mod columns;
 pub mod deformation_network;
+pub mod density_likelihood;
 #[cfg(feature = "wgpu")]
 mod fusion;
 mod host;
@@ -66,6 +67,7 @@ pub const ON_GPU: &[GpuOperation] = &[
     adam::gpu::OPERATION,
     columns::gpu::OPERATION,
     deformation_network::gpu::OPERATION,
+    density_likelihood::gpu::OPERATION,
     image_difference::gpu::OPERATION,
     lower_bound::gpu::OPERATION,
     mixture_bits::gpu::OPERATION,

@@ -15,15 +15,17 @@ use light4gs_model::{
     checkerboard_kernel, upsample,
 };
 use light4gs_tests::golden::{Golden, assert_close, assert_close_relative, devices, values_of};
-use light4gs_tests::named::{compare_gradients, load};
+use light4gs_tests::named::{compare_density, compare_gradients, load, load_density};
 
-/// The golden file's name of one of our parameters.
-fn name_in_file(path: &str) -> String {
+/// The golden file's name of one of our parameters, `None` for the density, which is several arrays there.
+fn name_in_file(path: &str) -> Option<String> {
+    if path.starts_with("hyperprior.bottleneck.density") {
+        return None;
+    }
     let names = [
         ("hyperprior.analysis.0", "h_a.0"),
         ("hyperprior.analysis.1", "h_a.2"),
         ("hyperprior.analysis.2", "h_a.4"),
-        ("hyperprior.bottleneck.density", "entropy_bottleneck"),
         ("hyperprior.bottleneck", "entropy_bottleneck"),
         ("hyperprior.synthesis_up.0", "h_s.0"),
         ("hyperprior.synthesis_up.1", "h_s.2"),
@@ -35,7 +37,7 @@ fn name_in_file(path: &str) -> String {
         ("entropy_parameters.layers.2", "entropy_parameters.4"),
     ];
     let (ours, theirs) = names.iter().find(|(ours, _)| path.starts_with(ours)).expect("the file has every parameter");
-    path.replace(ours, theirs)
+    Some(path.replace(ours, theirs))
 }
 
 /// The reference's model with the file's sizes and weights. The file's only bottleneck is the hyperprior's.
@@ -48,7 +50,9 @@ fn model_of(golden: &Golden, device: &Device) -> ContextModel {
     // The reference's inter-plane part is defined in this test.
     config.parts.retain(|part| *part != ContextPart::InterPlane);
     let mut model = config.init(device);
-    load(&mut model, golden, |path| Some(format!("param.{}", name_in_file(path))));
+    load(&mut model, golden, |path| Some(format!("param.{}", name_in_file(path)?)));
+    let hyperprior = model.hyperprior.as_mut().expect("the reference's model has a hyperprior");
+    load_density(&mut hyperprior.bottleneck.density, golden, "param.entropy_bottleneck.");
     model
 }
 
@@ -294,9 +298,12 @@ fn identity() {
             assert_close_relative(&format!("{name} {key}"), &gradient, &golden.values(&key), 1e-3);
         }
         let compared = compare_gradients(name, &model, &gradients, 1e-3, |parameter| {
-            let key = format!("identity.grad_param.{}", name_in_file(parameter));
+            let key = format!("identity.grad_param.{}", name_in_file(parameter)?);
             golden.has(&key).then(|| golden.values(&key))
         });
+        let density = &model.hyperprior.as_ref().unwrap().bottleneck.density;
+        let prefix = "identity.grad_param.entropy_bottleneck.";
+        let compared = compared + compare_density(name, density, &gradients, 1e-3, &golden, prefix);
         let in_file = golden.names().iter().filter(|key| key.starts_with("identity.grad_param.")).count();
         assert_eq!(compared, in_file, "{name}: compared parameters");
     }

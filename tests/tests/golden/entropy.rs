@@ -8,7 +8,7 @@ use light4gs_model::{
     ShBottleneckConfig, ShEntropy, ShKnown, ShTables,
 };
 use light4gs_tests::golden::{Golden, assert_close, assert_close_relative, devices, values_of};
-use light4gs_tests::named::{compare_gradients, load};
+use light4gs_tests::named::{compare_density, load, load_density};
 
 /// `[B, C, H, W]` in the shape of the bottleneck: `[C, B · H, W]`.
 fn channels_first(tensor: Tensor<4>) -> Tensor<3> {
@@ -20,23 +20,11 @@ fn latent(golden: &Golden, name: &str, device: &Device) -> Tensor<3> {
     channels_first(golden.tensor(name, device))
 }
 
-/// The golden file's name of one of our parameters.
-fn name_in_file(path: &str) -> &str {
-    path.strip_prefix("density.").unwrap_or(path)
-}
-
 fn bottleneck_of(golden: &Golden, device: &Device) -> EntropyBottleneck {
     let mut bottleneck = EntropyBottleneckConfig::new(golden.shape("x")[1]).init(device);
-    load(&mut bottleneck, golden, |path| Some(format!("param.{}", name_in_file(path))));
+    load_density(&mut bottleneck.density, golden, "param.");
+    load(&mut bottleneck, golden, |path| (path == "quantiles").then(|| "param.quantiles".to_owned()));
     bottleneck
-}
-
-fn param_gradients<'a>(golden: &'a Golden, prefix: &str) -> impl Fn(&str) -> Option<Vec<f32>> + use<'a> {
-    let prefix = prefix.to_owned();
-    move |path| {
-        let name = format!("{prefix}.grad.{}", name_in_file(path));
-        golden.has(&name).then(|| golden.values(&name))
-    }
 }
 
 #[test]
@@ -44,12 +32,19 @@ fn bottleneck_starts_as_compressai() {
     let golden = Golden::open("c04_entropy_bottleneck");
     let bottleneck = EntropyBottleneckConfig::new(3).init(&Device::flex());
     let first = |density: &FactorizedDensity| -> Vec<f32> {
-        density.matrices.iter().map(|matrix| values_of(&matrix.val())[0]).collect()
+        density.matrices().iter().map(|matrix| values_of(matrix)[0]).collect()
     };
     assert_close("matrices", &first(&bottleneck.density), &golden.values("init.matrix_value"), 1e-6);
     assert_eq!(values_of(&bottleneck.quantiles.val())[..3], golden.values("param.quantiles_initial")[..3]);
     let sh = Golden::open("c04_sh_bottleneck");
     let found = first(&ShBottleneckConfig::new().init(&Device::flex()).density);
+    for density in [&bottleneck.density, &ShBottleneckConfig::new().init(&Device::flex()).density] {
+        let uniform = |matrix: &Tensor<3>| values_of(matrix).windows(2).all(|pair| pair[0] == pair[1]);
+        assert!(density.matrices().iter().all(uniform));
+        let biases: Vec<f32> = density.biases().iter().flat_map(values_of).collect();
+        assert!(biases.iter().all(|bias| bias.abs() <= 0.5) && biases.iter().any(|bias| bias.abs() > 0.3));
+        assert!(density.factors().iter().flat_map(values_of).all(|factor| factor == 0.0));
+    }
     assert_close("sh matrices", &found, &sh.values("init.matrix_value"), 1e-6);
 }
 
@@ -107,7 +102,7 @@ fn check_bottleneck(
 ) {
     let found = values_of(&x.grad(gradients).unwrap());
     assert_close_relative(&format!("{what} grad_x"), &found, &golden.values(&format!("{prefix}.grad_x")), 1e-4);
-    let compared = compare_gradients(what, bottleneck, gradients, 1e-4, param_gradients(golden, prefix));
+    let compared = compare_density(what, &bottleneck.density, gradients, 1e-4, golden, &format!("{prefix}.grad."));
     assert_eq!(compared, 5 + 5 + 4, "{what}: compared parameters");
 }
 
@@ -205,13 +200,13 @@ fn bottleneck_cumulative_and_auxiliary_loss() {
         let gradient = values_of(&bottleneck.quantiles.val().grad(&gradients).unwrap());
         let expected = golden.values("aux_loss_initial_grad_quantiles");
         assert_close_relative(&format!("{name} grad quantiles"), &gradient, &expected, 1e-4);
-        assert!(bottleneck.density.matrices[0].val().grad(&gradients).is_none());
+        assert!(bottleneck.density.parameters.val().grad(&gradients).is_none());
     }
 }
 
 fn sh_of(golden: &Golden, device: &Device) -> ShBottleneck {
     let mut model = ShBottleneckConfig::new().with_step(golden.scalar("Q")).init(device);
-    load(&mut model, golden, |path| Some(format!("param.{}", name_in_file(path))));
+    load_density(&mut model.density, golden, "param.");
     model
 }
 
@@ -251,7 +246,8 @@ fn sh_bottleneck() {
             let gradients = total.backward();
             let gradient = values_of(&x.grad(&gradients).unwrap());
             assert_close_relative(&format!("{what} grad_x"), &gradient, &expected("grad_x"), 1e-4);
-            let compared = compare_gradients(&what, &model, &gradients, 1e-4, param_gradients(&golden, prefix));
+            let prefix = format!("{prefix}.grad.");
+            let compared = compare_density(&what, &model.density, &gradients, 1e-4, &golden, &prefix);
             assert_eq!(compared, 3 * 4, "{what}: compared parameters");
         }
     }

@@ -2,6 +2,7 @@
 
 mod columns;
 mod deformation_network;
+mod density_likelihood;
 mod image_difference;
 mod linear;
 mod mixture_bits;
