@@ -52,7 +52,7 @@ impl FactorizedDensityConfig {
 /// `sigmoid(l)` is a distribution function.
 #[derive(Module, Debug)]
 pub struct FactorizedDensity {
-    /// `[C, P]`: for each channel the matrix, the bias and the factor of each layer, as [`Self::shape`] says. They are one
+    /// `[C, P]`: for each channel the matrix, the bias and the factor of each layer, as [`Self::shape()`] says. They are one
     /// parameter, so that a GPU takes one launch for all of them.
     pub parameters: Param<Tensor<2>>,
     #[module(skip)]
