@@ -100,8 +100,8 @@ fn elementwise(device: &Device) -> Vec<f32> {
     let weights = Tensor::<1>::from_floats([1.0, -1.0, 2.0, -2.0, 1.5, -0.5], device);
     let mut found = Vec::new();
     let likelihood = |x: Tensor<1>| {
-        let scales = x.ones_like();
-        gaussian_likelihood(x.clone(), NormalParameters { means: x.zeros_like(), scales })
+        let parameters = NormalParameters::new(x.zeros_like(), x.ones_like());
+        gaussian_likelihood(x, parameters)
     };
     for operation in [likelihood as fn(_) -> _, |x| lower_bound(x, 0.5)] {
         let x = values();

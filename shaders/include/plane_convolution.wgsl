@@ -4,7 +4,7 @@ struct Parameters {
     large_channels: u32,
     large_height: u32,
     large_width: u32,
-    // Bit 0: only taps with row + column odd. Bit 1: there is a bias.
+    // Bit 0: only taps with row + column odd. Bit 1: forward. Bit 2: transposed.
     flags: u32,
     small_channels: u32,
     small_height: u32,
@@ -15,7 +15,7 @@ struct Parameters {
     // Rows and columns of the larger plane between those of the smaller one.
     stride: u32,
     groups: u32,
-    transposed: u32,
+    unused: u32,
 }
 
 fn uses_tap(parameters: Parameters, row: u32, column: u32) -> bool {
@@ -30,6 +30,11 @@ fn outputs_of_group(parameters: Parameters) -> u32 {
     return parameters.small_channels / parameters.groups;
 }
 
-fn leaky(value: f32, slope: f32) -> f32 {
-    return select(slope * value, value, value > 0.0);
+fn is_forward(parameters: Parameters) -> bool {
+    return (parameters.flags & 2u) != 0u;
+}
+
+// A value, or its gradient, through the leaky ReLU; `output` has the sign of what goes into it.
+fn leaky(value: f32, output: f32, slope: f32) -> f32 {
+    return select(slope * value, value, output > 0.0);
 }

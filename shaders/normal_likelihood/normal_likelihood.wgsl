@@ -1,21 +1,23 @@
-// Probability of the unit interval around each value under its normal distribution.
+// Probability of the unit interval around each value under its normal distribution, or its bits.
 //
-// Each invocation computes one value. It reads `values`, `means` and `scales`, and writes `likelihoods`.
+// Each invocation computes one value. It reads `values` and `parameters`, all standard deviations and then all means,
+// and writes `measured`.
 
 // #include exponential, normal
 
-struct Parameters {
+struct Bounds {
     count: u32,
     // Standard deviations and probabilities below these are raised to them.
-    scale_bound: f32,
-    likelihood_bound: f32,
+    scale: f32,
+    likelihood: f32,
+    // Whether bits are asked for in place of probabilities.
+    in_bits: u32,
 }
 
 @group(0) @binding(0) var<storage, read_write> values: array<f32>;
-@group(0) @binding(1) var<storage, read_write> means: array<f32>;
-@group(0) @binding(2) var<storage, read_write> scales: array<f32>;
-@group(0) @binding(3) var<storage, read_write> likelihoods: array<f32>;
-@group(0) @binding(4) var<uniform> parameters: Parameters;
+@group(0) @binding(1) var<storage, read_write> parameters: array<f32>;
+@group(0) @binding(2) var<storage, read_write> measured: array<f32>;
+@group(0) @binding(3) var<uniform> bounds: Bounds;
 
 @compute @workgroup_size(WORKGROUP)
 fn main(
@@ -24,9 +26,11 @@ fn main(
     @builtin(local_invocation_index) lane: u32,
 ) {
     let i = flat_group(group, groups) * WORKGROUP + lane;
-    if (i >= parameters.count) {
+    if (i >= bounds.count) {
         return;
     }
-    let edges = edges_of(values[i] - means[i], max(scales[i], parameters.scale_bound));
-    likelihoods[i] = max(mass_between(edges), parameters.likelihood_bound);
+    let offset = values[i] - parameters[bounds.count + i];
+    let edges = edges_of(offset, max(parameters[i], bounds.scale));
+    let likelihood = max(mass_between(edges), bounds.likelihood);
+    measured[i] = select(likelihood, -log2(likelihood), bounds.in_bits != 0u);
 }

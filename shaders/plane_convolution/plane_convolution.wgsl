@@ -1,16 +1,24 @@
 // The smaller plane of a convolution from the larger one, plus the bias, through the leaky ReLU. It is also the gradient of the
-// transposed convolution by its input, then without bias.
+// transposed convolution by its input, through the leaky ReLU behind that one.
 //
 // Each invocation computes one value of the smaller plane `small [O, h, w]`. It reads `large [I, H, W]`,
-// `weight [O, I / groups, kernel, kernel]` and `bias [O]`.
+// `weight [O, I / groups, kernel, kernel]` and `beside`: forward the bias `[O]`,
+// backward the output of which `large` is the gradient.
 
 // #include plane_convolution
 
 @group(0) @binding(0) var<storage, read_write> large: array<f32>;
 @group(0) @binding(1) var<storage, read_write> weight: array<f32>;
-@group(0) @binding(2) var<storage, read_write> bias: array<f32>;
+@group(0) @binding(2) var<storage, read_write> beside: array<f32>;
 @group(0) @binding(3) var<storage, read_write> small: array<f32>;
 @group(0) @binding(4) var<uniform> parameters: Parameters;
+
+fn source_value(i: u32) -> f32 {
+    if (is_forward(parameters)) {
+        return large[i];
+    }
+    return leaky(large[i], beside[i], parameters.slope);
+}
 
 @compute @workgroup_size(WORKGROUP)
 fn main(
@@ -44,13 +52,14 @@ fn main(
             for (var right = 0u; right < kernel; right++) {
                 let source_column = column * parameters.stride + right - before;
                 if (source_column < parameters.large_width && uses_tap(parameters, down, right)) {
-                    sum += weight[kernel_at + down * kernel + right] * large[source + source_column];
+                    sum += weight[kernel_at + down * kernel + right] * source_value(source + source_column);
                 }
             }
         }
     }
-    if ((parameters.flags & 2u) != 0u) {
-        sum = leaky(sum + bias[channel], parameters.slope);
+    if (is_forward(parameters)) {
+        sum += beside[channel];
+        sum = leaky(sum, sum, parameters.slope);
     }
     small[i] = sum;
 }

@@ -1,16 +1,24 @@
 // The larger plane of a transposed convolution from the smaller one, plus the bias, through the leaky ReLU. It is also the gradient of
-// the convolution by its input, then without bias.
+// the convolution by its input, through the leaky ReLU behind that one.
 //
 // Each invocation computes one value of the larger plane `large [I, H, W]`. It reads `small [O, h, w]`,
-// `weight [O, I / groups, kernel, kernel]` and `bias [I]`.
+// `weight [O, I / groups, kernel, kernel]` and `beside`: forward the bias `[I]`,
+// backward the output of which `small` is the gradient.
 
 // #include plane_convolution
 
 @group(0) @binding(0) var<storage, read_write> small: array<f32>;
 @group(0) @binding(1) var<storage, read_write> weight: array<f32>;
-@group(0) @binding(2) var<storage, read_write> bias: array<f32>;
+@group(0) @binding(2) var<storage, read_write> beside: array<f32>;
 @group(0) @binding(3) var<storage, read_write> large: array<f32>;
 @group(0) @binding(4) var<uniform> parameters: Parameters;
+
+fn source_value(i: u32) -> f32 {
+    if (is_forward(parameters)) {
+        return small[i];
+    }
+    return leaky(small[i], beside[i], parameters.slope);
+}
 
 @compute @workgroup_size(WORKGROUP)
 fn main(
@@ -49,13 +57,14 @@ fn main(
                 let source_column = strided_column / parameters.stride;
                 let meets = strided_column % parameters.stride == 0u && source_column < parameters.small_width;
                 if (meets && uses_tap(parameters, down, right)) {
-                    sum += weight[kernel_at + down * kernel + right] * small[source + source_column];
+                    sum += weight[kernel_at + down * kernel + right] * source_value(source + source_column);
                 }
             }
         }
     }
-    if ((parameters.flags & 2u) != 0u) {
-        sum = leaky(sum + bias[channel], parameters.slope);
+    if (is_forward(parameters)) {
+        sum += beside[channel];
+        sum = leaky(sum, sum, parameters.slope);
     }
     large[i] = sum;
 }

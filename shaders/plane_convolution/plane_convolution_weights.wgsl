@@ -1,5 +1,5 @@
 // Gradients of the weights and of the bias of a convolution from its input and the gradient of its output. `large [I, H, W]` and
-// `small [O, h, w]` are these two, in this order, or of a transposed convolution in the other one.
+// `small [O, h, w]` are these two, in this order, or of a transposed convolution in the other one; `outputs` is its output.
 //
 // A workgroup owns the kernel between an input and an output channel. For each tap its invocations take every WORKGROUP-th place of the
 // smaller plane, and their sums are added up. The workgroups after the last kernel own a channel of the bias each.
@@ -8,9 +8,29 @@
 
 @group(0) @binding(0) var<storage, read_write> large: array<f32>;
 @group(0) @binding(1) var<storage, read_write> small: array<f32>;
-@group(0) @binding(2) var<storage, read_write> of_weight: array<f32>;
-@group(0) @binding(3) var<storage, read_write> of_bias: array<f32>;
-@group(0) @binding(4) var<uniform> parameters: Parameters;
+@group(0) @binding(2) var<storage, read_write> outputs: array<f32>;
+@group(0) @binding(3) var<storage, read_write> of_weight: array<f32>;
+@group(0) @binding(4) var<storage, read_write> of_bias: array<f32>;
+@group(0) @binding(5) var<uniform> parameters: Parameters;
+
+fn is_transposed() -> bool {
+    return (parameters.flags & 4u) != 0u;
+}
+
+// Values of the planes, the gradient among them through the leaky ReLU.
+fn large_value(i: u32) -> f32 {
+    if (is_transposed()) {
+        return leaky(large[i], outputs[i], parameters.slope);
+    }
+    return large[i];
+}
+
+fn small_value(i: u32) -> f32 {
+    if (is_transposed()) {
+        return small[i];
+    }
+    return leaky(small[i], outputs[i], parameters.slope);
+}
 
 @compute @workgroup_size(WORKGROUP)
 fn main(
@@ -25,18 +45,17 @@ fn main(
     let large_area = parameters.large_height * parameters.large_width;
     if (own >= kernels) {
         let channel = own - kernels;
-        let transposed = parameters.transposed != 0u;
-        if (channel >= select(parameters.small_channels, parameters.large_channels, transposed)) {
+        if (channel >= select(parameters.small_channels, parameters.large_channels, is_transposed())) {
             return;
         }
         var sum = 0.0;
-        if (transposed) {
+        if (is_transposed()) {
             for (var i = lane; i < large_area; i += WORKGROUP) {
-                sum += large[channel * large_area + i];
+                sum += large_value(channel * large_area + i);
             }
         } else {
             for (var i = lane; i < small_area; i += WORKGROUP) {
-                sum += small[channel * small_area + i];
+                sum += small_value(channel * small_area + i);
             }
         }
         let total = workgroup_sum(sum, lane);
@@ -59,7 +78,8 @@ fn main(
                 let row = i / parameters.small_width * parameters.stride + down - before;
                 let column = i % parameters.small_width * parameters.stride + right - before;
                 if (row < parameters.large_height && column < parameters.large_width) {
-                    sum += small[output * small_area + i] * large[input * large_area + row * parameters.large_width + column];
+                    let met = input * large_area + row * parameters.large_width + column;
+                    sum += small_value(output * small_area + i) * large_value(met);
                 }
             }
         }

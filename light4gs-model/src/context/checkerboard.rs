@@ -66,14 +66,20 @@ impl Checkerboard {
     /// ```
     pub fn context(&self, plane: Tensor<3>) -> Tensor<3> {
         let [_, height, width] = plane.dims();
-        let anchors = anchor_mask([height, width], &plane.device());
-        let others = (anchors.clone() - 1.0).neg();
-        self.conv.forward(plane * anchors) * others
+        let others = parity_mask([height, width], 0, &plane.device());
+        // From one of the others the taps lead to anchors only, so the plane needs no mask.
+        self.conv.forward(plane) * others
     }
 }
 
 /// `[1, H, W]`: 1 at the anchors, where row + column is odd, else 0.
-pub fn anchor_mask([height, width]: [usize; 2], device: &Device) -> Tensor<3> {
-    let mask: Vec<f32> = (0..height * width).map(|i| ((i / width + i % width) % 2) as f32).collect();
+pub fn anchor_mask(size: [usize; 2], device: &Device) -> Tensor<3> {
+    parity_mask(size, 1, device)
+}
+
+/// `[1, H, W]`: 1 where row + column is odd (`parity` 1) or even (0), else 0.
+fn parity_mask([height, width]: [usize; 2], parity: usize, device: &Device) -> Tensor<3> {
+    let is_in = |i: usize| u8::from((i / width + i % width) % 2 == parity);
+    let mask: Vec<f32> = (0..height * width).map(|i| is_in(i).into()).collect();
     Tensor::<1>::from_floats(mask.as_slice(), device).reshape([1, height, width])
 }

@@ -96,10 +96,7 @@ impl EntropyParameters {
                 leaky_relu(bias, LEAKY_SLOPE).expand([outputs, height, width])
             }
         };
-        let output = last.forward(second.rectified(hidden));
-        let [doubled, ..] = output.dims();
-        let channels = doubled / 2;
-        NormalParameters { scales: output.clone().narrow(0, 0, channels), means: output.narrow(0, channels, channels) }
+        NormalParameters::of_network(last.forward(second.rectified(hidden)))
     }
 
     /// Makes the network give approximately this mean and scale (in steps) for each channel, for any input: they become

@@ -49,7 +49,10 @@ impl CenteredPlanes {
 
     /// A plane in units of its step, `[M, H, W]`.
     pub fn in_steps(&self, plane: usize) -> Tensor<3> {
-        self.plane(plane) / self.steps.broadcast(plane)
+        let values = self.plane(plane);
+        let shape = values.dims();
+        // As a vector: the sum for the gradient of the step then has one axis.
+        (values.reshape([-1]) / self.steps.of(plane)).reshape(shape)
     }
 
     /// The layout of the planes.

@@ -7,7 +7,7 @@ use super::ContextModel;
 use super::checkerboard::anchor_mask;
 use super::prior::{CenteredPlanes, Passes, Prior, PriorPart};
 use crate::entropy::bottleneck::Latent;
-use crate::entropy::gaussian_conditional::{NormalParameters, bits, gaussian_likelihood};
+use crate::entropy::gaussian_conditional::{NormalParameters, gaussian_bits};
 use crate::entropy::quantization_steps::PlaneSteps;
 use crate::planes::PlaneTensors;
 
@@ -64,7 +64,7 @@ impl ContextModel {
         latent: Latent,
     ) -> PlaneRate {
         let (gaussians, latent_bits) = self.parameters_with(parts, planes, plane, latent);
-        PlaneRate { plane, values_bits: value_bits(planes.in_steps(plane), gaussians).sum(), latent_bits }
+        PlaneRate { plane, values_bits: gaussian_bits(planes.in_steps(plane), gaussians).sum(), latent_bits }
     }
 
     /// Means and scales of a plane's values under a composition of parts, in units of the plane's step and relative to its
@@ -90,7 +90,7 @@ impl ContextModel {
         latent: Latent,
     ) -> Tensor<2> {
         let (gaussians, _) = self.parameters_with(parts, planes, plane, latent);
-        value_bits(planes.in_steps(plane), gaussians).sum_dim(0).squeeze_dim(0)
+        gaussian_bits(planes.in_steps(plane), gaussians).sum_dim(0).squeeze_dim(0)
     }
 
     /// For each plane that has a latent under a composition of parts, the latent's symbols `[N, H / 4, W / 4]`.
@@ -129,15 +129,16 @@ impl ContextModel {
                 // The checkerboard reads only anchors.
                 let [_, height, width] = values.dims();
                 let anchors = Prior { passes: Passes::One, ..prior.clone() };
-                let anchors = round(self.gaussians(anchors, &known, plane).means);
+                let anchors = round(self.gaussians(anchors, &known, plane).means());
                 let mask = anchor_mask([height, width], &values.device());
                 known.set(plane, anchors * mask);
             }
             let gaussians = self.gaussians(prior, &known, plane);
-            let symbols = (values - gaussians.means.clone()).round();
-            let received = symbols.clone() + gaussians.means.clone();
+            let means = gaussians.means();
+            let symbols = (values - means.clone()).round();
+            let received = symbols.clone() + means;
             let decoded = received.clone() * step;
-            let rate = PlaneRate { plane, values_bits: value_bits(received, gaussians).sum(), latent_bits };
+            let rate = PlaneRate { plane, values_bits: gaussian_bits(received, gaussians).sum(), latent_bits };
             known.set(plane, decoded.clone());
             let decoded = decoded + self.center_of(planes.layout().planes()[plane].axes);
             quantized[plane] = Some(QuantizedPlane { decoded, symbols, rate });
@@ -194,8 +195,4 @@ const SMALLEST_START: f64 = 0.3;
 
 fn prior_of(parts: &[Box<dyn PriorPart + '_>], planes: &CenteredPlanes, plane: usize, latent: Latent) -> Prior {
     parts.iter().find_map(|part| part.prior(planes, plane, latent)).unwrap_or_else(Prior::constant)
-}
-
-fn value_bits(values: Tensor<3>, normal: NormalParameters<3>) -> Tensor<3> {
-    bits(gaussian_likelihood(values, normal))
 }

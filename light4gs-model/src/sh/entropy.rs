@@ -7,7 +7,7 @@ use light4gs_codec::{CodecError, ShCoding, ShPrior};
 
 use super::tables::table_coding;
 
-use crate::entropy::gaussian_conditional::{NormalParameters, bits, gaussian_likelihood};
+use crate::entropy::gaussian_conditional::{self, NormalParameters};
 use crate::planes::PlaneTensors;
 
 /// Channels of the higher spherical harmonics.
@@ -104,17 +104,11 @@ pub fn channels_last(values: Tensor<2>) -> Tensor<3> {
 
 /// Bits `[C, N]` of `values [C, N]`, given a network's output `[2 C, 1, N]`: first scales, then means, in steps.
 pub fn gaussian_bits(values: Tensor<2>, output: Tensor<3>, step: f32) -> Tensor<2> {
-    bits(gaussian_likelihood(values / step, normal_parameters(output)))
+    gaussian_conditional::gaussian_bits(values / step, NormalParameters::of_network(output.squeeze_dim(1)))
 }
 
 /// `values [C, N]` rounded around the means of a network's output `[2 C, 1, N]`.
 pub fn round_around(values: Tensor<2>, output: Tensor<3>, step: f32) -> Tensor<2> {
-    let means = normal_parameters(output).means;
+    let means = NormalParameters::<2>::of_network(output.squeeze_dim(1)).means();
     ((values / step - means.clone()).round() + means) * step
-}
-
-fn normal_parameters(output: Tensor<3>) -> NormalParameters<2> {
-    let output: Tensor<2> = output.squeeze_dim(1);
-    let channels = output.dims()[0] / 2;
-    NormalParameters { scales: output.clone().narrow(0, 0, channels), means: output.narrow(0, channels, channels) }
 }

@@ -219,7 +219,7 @@ fn pieces() {
         let [inputs, height, width] = x.dims();
         let [parameters, context] = [0, inputs / 2].map(|start| Some(x.clone().narrow(0, start, inputs / 2)));
         let found = model.entropy_parameters.forward(parameters, context, [height, width]);
-        check("entropy_parameters.out", &Tensor::cat(vec![found.scales, found.means], 0));
+        check("entropy_parameters.out", &Tensor::cat(vec![found.scales(), found.means()], 0));
 
         for key in ["interscale", "interscale_xt"] {
             let expected = format!("{key}.up");
@@ -259,7 +259,7 @@ fn trace_of_a_space_time_plane() {
         check("ctx_params", &conv.forward(plane.clone() * anchor_mask([height, width], &device)));
         let both = |context: Option<Tensor<3>>| {
             let gaussians = model.entropy_parameters.forward(Some(parameters.clone()), context, [height, width]);
-            Tensor::cat(vec![gaussians.scales, gaussians.means], 0)
+            Tensor::cat(vec![gaussians.scales(), gaussians.means()], 0)
         };
         check("gauss_anchor", &both(None));
         // The file has the second pass at every place; our second pass leaves the anchors' parameters as they are.
@@ -321,7 +321,7 @@ fn eval() {
         let mut total = 0.0;
         for plane in 0..planes.layout().len() {
             let (gaussians, hyper) = model.parameters_with(&parts, &planes, plane, Latent::Rounded);
-            let rounded = (planes.in_steps(plane) - gaussians.means.clone()).round() + gaussians.means.clone();
+            let rounded = (planes.in_steps(plane) - gaussians.means()).round() + gaussians.means();
             let likelihood = gaussian_likelihood(rounded, gaussians);
             let what = format!("{name} eval {}", file_key(plane));
             let key = format!("eval.likelihood_y.{}", file_key(plane));

@@ -63,7 +63,7 @@ fn cases() -> impl Iterator<Item = (String, PlaneLayout, ContextModelConfig)> {
 /// Means and scales of a plane, side by side.
 fn parameters(model: &ContextModel, planes: &PlaneTensors, plane: usize) -> Vec<f32> {
     let found = model.plane_parameters(planes, &steps(planes), &[plane], Latent::Rounded);
-    [values_of(&found[0].means), values_of(&found[0].scales)].concat()
+    [values_of(&found[0].means()), values_of(&found[0].scales())].concat()
 }
 
 /// Which parameters of a plane change if one value of a plane changes. None for a plane with a hyperprior, which is

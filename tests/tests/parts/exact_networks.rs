@@ -80,7 +80,7 @@ fn spherical_harmonics_cost_what_the_model_says() {
             let Distributions { scales, means } =
                 sh_distributions(&gaussians, &coding, &data.coordinates, &data.feature_planes).unwrap();
             let tensor = |values: Vec<f32>| Tensor::<3>::from_data(TensorData::new(values, [COUNT, 15, 3]), &device);
-            let parameters = NormalParameters { means: tensor(means), scales: tensor(scales) };
+            let parameters = NormalParameters::new(tensor(means), tensor(scales));
             let exact = bits(gaussian_likelihood(values.clone() / model.step(), parameters));
             assert_close_relative(name, &values_of(&exact), &values_of(&model.bits(values, &known)), 1e-3);
         }

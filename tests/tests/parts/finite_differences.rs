@@ -379,7 +379,7 @@ fn normal_likelihood_along_random_directions() {
                 let mut tensors = inputs.each_ref().map(|input| tensor(input));
                 tensors[k] = x;
                 let [values, means, scales] = tensors;
-                normal_likelihood(values, means, scales, BOUNDS)
+                normal_likelihood(values, Tensor::cat(vec![scales, means], 0), BOUNDS)
             };
             let what = format!("{name} normal likelihood, {what}");
             check_elementwise(&what, &inputs[k], operation, &device, &mut random);
@@ -409,7 +409,8 @@ fn normal_likelihood_against_the_twin() {
             let places: Vec<f64> = (-90..=90).map(|i| f64::from((f64::from(i) * 0.1 * scale) as f32)).collect();
             let values: Vec<f32> = places.iter().map(|v| *v as f32).collect();
             let leaf = Tensor::<1>::from_floats(values.as_slice(), &device).require_grad();
-            let found = normal_likelihood(leaf.clone(), leaf.zeros_like(), leaf.ones_like() * scale, BOUNDS);
+            let parameters = Tensor::cat(vec![leaf.ones_like() * scale, leaf.zeros_like()], 0);
+            let found = normal_likelihood(leaf.clone(), parameters, BOUNDS);
             let gradient = values_of(&leaf.grad(&found.clone().sum().backward()).unwrap());
             for ((x, found), gradient) in places.iter().zip(values_of(&found)).zip(gradient) {
                 let scale = f64::from(scale as f32);

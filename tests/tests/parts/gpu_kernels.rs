@@ -25,8 +25,8 @@ fn run(function: fn(Tensor<1>) -> Tensor<1>, device: Device, count: usize) -> [V
 
 /// Under the standard normal distribution, with a bound that no place here reaches.
 fn around_zero(places: Tensor<1>) -> Tensor<1> {
-    let (means, scales) = (places.zeros_like(), places.ones_like());
-    normal_likelihood(places, means, scales, NormalBounds { scale: 0.11, likelihood: 1e-37 })
+    let parameters = Tensor::cat(vec![places.ones_like(), places.zeros_like()], 0);
+    normal_likelihood(places, parameters, NormalBounds { scale: 0.11, likelihood: 1e-37 })
 }
 
 #[test]

@@ -1,10 +1,12 @@
 //! Probabilities of unit intervals on a CPU.
 
+use std::f32::consts::LOG2_E;
+
 use burn::backend::TensorMetadata;
 use burn::backend::tensor::FloatTensor;
 use rayon::prelude::*;
 
-use super::{NormalBounds, NormalLikelihoodKernels, NormalLikelihoodOps, NormalTensors};
+use super::{Measure, NormalBounds, NormalLikelihoodKernels, NormalLikelihoodOps, NormalTensors};
 use crate::ops::for_cpu_back_ends;
 use crate::ops::host::HostBackend;
 
@@ -80,37 +82,51 @@ fn through_bound(value: f32, bound: f32, gradient: f32) -> f32 {
     if value < bound && gradient >= 0.0 { 0.0 } else { gradient }
 }
 
-fn forward<B: HostBackend>(tensors: NormalTensors<B>, bounds: NormalBounds) -> FloatTensor<B> {
+fn forward<B: HostBackend>(tensors: NormalTensors<B>, bounds: NormalBounds, measure: Measure) -> FloatTensor<B> {
     let shape = tensors.values.shape();
-    let [values, means, scales] = tensors.into_array().map(B::to_host);
-    let [values, means, scales] = [&values, &means, &scales].map(|tensor| tensor.as_slice());
-    let mut likelihoods = vec![0.0; values.len()];
-    likelihoods.par_chunks_mut(CHUNK).enumerate().for_each(|(chunk, likelihoods)| {
-        for (i, likelihood) in (chunk * CHUNK..).zip(likelihoods) {
-            *likelihood = Interval::new([values[i], means[i], scales[i]], bounds).likelihood().max(bounds.likelihood);
+    let [values, parameters] = tensors.into_array().map(B::to_host);
+    let values = values.as_slice();
+    let (scales, means) = parameters.as_slice().split_at(values.len());
+    let mut measured = vec![0.0; values.len()];
+    measured.par_chunks_mut(CHUNK).enumerate().for_each(|(chunk, measured)| {
+        for (i, measured) in (chunk * CHUNK..).zip(measured) {
+            let likelihood = Interval::new([values[i], means[i], scales[i]], bounds).likelihood();
+            let likelihood = likelihood.max(bounds.likelihood);
+            *measured = match measure {
+                Measure::Likelihood => likelihood,
+                Measure::Bits => -likelihood.log2(),
+            };
         }
     });
-    B::from_values(likelihoods, shape)
+    B::from_values(measured, shape)
 }
 
 fn backward<B: HostBackend>(
     tensors: NormalTensors<B>,
     bounds: NormalBounds,
+    measure: Measure,
     upstream: FloatTensor<B>,
 ) -> NormalTensors<B> {
-    let shape = tensors.values.shape();
-    let [values, means, scales] = tensors.into_array().map(B::to_host);
-    let [values, means, scales] = [&values, &means, &scales].map(|tensor| tensor.as_slice());
+    let shapes = [tensors.values.shape(), tensors.parameters.shape()];
+    let [values, parameters] = tensors.into_array().map(B::to_host);
+    let values = values.as_slice();
+    let (scales, means) = parameters.as_slice().split_at(values.len());
     let upstream = B::to_host(upstream);
     let upstream = upstream.as_slice();
-    let mut gradients = [(); 3].map(|()| vec![0.0; values.len()]);
-    let [of_values, of_means, of_scales] = &mut gradients;
+    let mut of_values = vec![0.0; values.len()];
+    let mut of_parameters = vec![0.0; 2 * values.len()];
+    let (of_scales, of_means) = of_parameters.split_at_mut(values.len());
     let rows = of_values.par_chunks_mut(CHUNK).zip(of_means.par_chunks_mut(CHUNK)).zip(of_scales.par_chunks_mut(CHUNK));
     rows.enumerate().for_each(|(chunk, ((of_values, of_means), of_scales))| {
         let rows = of_values.iter_mut().zip(of_means).zip(of_scales);
         for (i, ((of_value, of_mean), of_scale)) in (chunk * CHUNK..).zip(rows) {
             let interval = Interval::new([values[i], means[i], scales[i]], bounds);
-            let gradient = through_bound(interval.likelihood(), bounds.likelihood, upstream[i]);
+            let likelihood = interval.likelihood();
+            let of_likelihood = match measure {
+                Measure::Likelihood => upstream[i],
+                Measure::Bits => -LOG2_E * upstream[i] / likelihood.max(bounds.likelihood),
+            };
+            let gradient = through_bound(likelihood, bounds.likelihood, of_likelihood);
             let [by_distance, by_scale] = interval.derivatives();
             let offset = values[i] - means[i];
             // The distance has no derivative at the mean, where that of the likelihood is 0.
@@ -119,13 +135,21 @@ fn backward<B: HostBackend>(
             *of_scale = through_bound(scales[i], bounds.scale, gradient * by_scale);
         }
     });
-    NormalTensors::from_array(gradients.map(|gradient| B::from_values(gradient, shape.clone())))
+    let [of_values_shape, of_parameters_shape] = shapes;
+    NormalTensors {
+        values: B::from_values(of_values, of_values_shape),
+        parameters: B::from_values(of_parameters, of_parameters_shape),
+    }
 }
 
 for_cpu_back_ends! {
     NormalLikelihoodOps {
-        fn normal_likelihood(tensors: NormalTensors<Self>, bounds: NormalBounds) -> FloatTensor<Self> {
-            forward(tensors, bounds)
+        fn normal_likelihood(
+            tensors: NormalTensors<Self>,
+            bounds: NormalBounds,
+            measure: Measure,
+        ) -> FloatTensor<Self> {
+            forward(tensors, bounds, measure)
         }
     }
 }
@@ -135,9 +159,10 @@ for_cpu_back_ends! {
         fn normal_likelihood_backward(
             tensors: NormalTensors<Self>,
             bounds: NormalBounds,
+            measure: Measure,
             upstream: FloatTensor<Self>,
         ) -> NormalTensors<Self> {
-            backward(tensors, bounds, upstream)
+            backward(tensors, bounds, measure, upstream)
         }
     }
 }

@@ -6,10 +6,10 @@ use burn::tensor::{Device, Shape, TensorData};
 use burn_fusion::{Fusion, FusionBackend};
 use burn_wgpu::{CubeBackend, CubeTensor};
 use cubecl::server::Handle;
-use light4gs_shaders::{LEAKY_GRADIENT, PLANE_CONVOLUTION, PLANE_CONVOLUTION_TRANSPOSED, PLANE_CONVOLUTION_WEIGHTS};
+use light4gs_shaders::{PLANE_CONVOLUTION, PLANE_CONVOLUTION_TRANSPOSED, PLANE_CONVOLUTION_WEIGHTS};
 
 use super::{ConvolutionTensors, Convolved, PlaneConvolution, PlaneConvolutionKernels, Sizes, convolve};
-use crate::gpu::{Gpu, Kernel, Launch, buffer_of, elementwise, first_words};
+use crate::gpu::{Gpu, Kernel, Launch, buffer_of, first_words};
 use crate::gpu_error::GpuError;
 use crate::ops::fusion::{leaf, resolve};
 use crate::ops::sample::{GpuOperation, Numbers};
@@ -20,34 +20,44 @@ pub(in crate::ops) const OPERATION: GpuOperation =
 
 /// The kernels of this file.
 fn kernels() -> Vec<Kernel> {
-    [PLANE_CONVOLUTION, PLANE_CONVOLUTION_TRANSPOSED, PLANE_CONVOLUTION_WEIGHTS, LEAKY_GRADIENT].map(Kernel::new).into()
+    [PLANE_CONVOLUTION, PLANE_CONVOLUTION_TRANSPOSED, PLANE_CONVOLUTION_WEIGHTS].map(Kernel::new).into()
+}
+
+/// What a convolution reads beside plane and weights, and the slope of the leaky ReLU.
+#[derive(Clone, Copy)]
+enum Beside<'a> {
+    /// Forward: the bias.
+    Bias(&'a Handle, f32),
+    /// Backward: the output, which has the sign of what went into the leaky ReLU. The plane is its gradient.
+    Output(&'a Handle, f32),
 }
 
 impl Sizes {
-    fn uniform(&self, slope: f32, has_bias: bool) -> [u32; 12] {
+    fn uniform(&self, slope: f32, forward: bool, transposed: bool) -> [u32; 12] {
         let [large, small] = [self.large, self.small].map(|sizes| sizes.map(|size| size as u32));
         let [kernel, stride, groups] = [self.kernel, self.stride, self.groups].map(|number| number as u32);
-        let flags = u32::from(self.checkerboard) | u32::from(has_bias) << 1;
+        let flags = u32::from(self.checkerboard) | u32::from(forward) << 1 | u32::from(transposed) << 2;
         [large[0], large[1], large[2], flags, small[0], small[1], small[2], slope.to_bits(), kernel, stride, groups, 0]
     }
 
-    /// The smaller plane from the larger one, or with `transposed` the other way round; without a bias also without a slope.
+    /// The smaller plane from the larger one, or with `transposed` the other way round.
     fn convolved(
         &self,
         gpu: &Gpu,
         [plane, weight]: [&Handle; 2],
-        bias: Option<(&Handle, f32)>,
+        beside: Beside,
         transposed: bool,
     ) -> Result<CubeTensor, GpuError> {
         let shape = self.output(transposed);
         let count = shape.iter().product();
         let output = gpu.allocate("convolved plane", count)?;
         let shader = if transposed { PLANE_CONVOLUTION_TRANSPOSED } else { PLANE_CONVOLUTION };
-        // Without a bias its buffer is not read.
-        let none = gpu.allocate("no bias", 1)?;
-        let (bias, slope, has_bias) = bias.map_or((&none, 1.0, false), |(bias, slope)| (bias, slope, true));
-        let launch = Launch::new(&gpu.client, shader).reads(plane).reads(weight).reads(bias).writes(&output);
-        launch.uniform(&self.uniform(slope, has_bias)).invocations(count)?;
+        let (beside, slope, forward) = match beside {
+            Beside::Bias(bias, slope) => (bias, slope, true),
+            Beside::Output(output, slope) => (output, slope, false),
+        };
+        let launch = Launch::new(&gpu.client, shader).reads(plane).reads(weight).reads(beside).writes(&output);
+        launch.uniform(&self.uniform(slope, forward, transposed)).invocations(count)?;
         Ok(gpu.tensor(first_words(&output, count), Shape::from(shape)))
     }
 }
@@ -56,7 +66,7 @@ fn forward(tensors: ConvolutionTensors<CubeBackend>, convolution: PlaneConvoluti
     let gpu = Gpu::of(&tensors.plane)?;
     let sizes = Sizes::of(&tensors, convolution);
     let [plane, weight, bias] = [tensors.plane, tensors.weight, tensors.bias].map(buffer_of);
-    sizes.convolved(&gpu, [&plane, &weight], Some((&bias, convolution.slope)), convolution.transposed)
+    sizes.convolved(&gpu, [&plane, &weight], Beside::Bias(&bias, convolution.slope), convolution.transposed)
 }
 
 fn backward(saved: Convolved<CubeBackend>, gradient: CubeTensor) -> Result<ConvolutionTensors<CubeBackend>, GpuError> {
@@ -67,24 +77,21 @@ fn backward(saved: Convolved<CubeBackend>, gradient: CubeTensor) -> Result<Convo
     let tensors = ConvolutionTensors::<CubeBackend> { plane, weight, bias: gradient };
     let sizes = Sizes::of(&tensors, convolution);
     let ConvolutionTensors { plane, weight, bias: gradient } = tensors;
-    // The output has the sign of what went into the leaky ReLU.
-    let gradient = if slope == 1.0 { gradient } else { elementwise(LEAKY_GRADIENT, [output, gradient], &[slope]) };
-    let [plane, weight, gradient] = [plane, weight, gradient].map(buffer_of);
-    let of_plane = sizes.convolved(&gpu, [&gradient, &weight], None, !transposed)?;
+    let [plane, weight, gradient, output] = [plane, weight, gradient, output].map(buffer_of);
+    let of_plane = sizes.convolved(&gpu, [&gradient, &weight], Beside::Output(&output, slope), !transposed)?;
 
     let count = weight_shape.num_elements();
     let of_weight = gpu.allocate("gradients of weights", count)?;
     let channels = sizes.output(transposed)[0];
     let of_bias = gpu.allocate("gradients of biases", channels)?;
     let (large, small) = if transposed { (&gradient, &plane) } else { (&plane, &gradient) };
-    let mut uniform = sizes.uniform(1.0, true);
-    uniform[11] = transposed.into();
     Launch::new(&gpu.client, PLANE_CONVOLUTION_WEIGHTS)
         .reads(large)
         .reads(small)
+        .reads(&output)
         .writes(&of_weight)
         .writes(&of_bias)
-        .uniform(&uniform)
+        .uniform(&sizes.uniform(slope, false, transposed))
         .groups(sizes.small[0] * sizes.inputs_of_group() + channels)?;
     Ok(ConvolutionTensors {
         plane: of_plane,
