@@ -81,8 +81,8 @@ fn modules_and_exact_executor_agree() {
             {
                 let exact = plane_distributions(&arrays, &coding, plane).unwrap();
                 let what = |part: &str| format!("{name}, {set}, composition {which}, plane {plane}: {part}");
-                assert_close_relative(&what("means"), &values_of(&gaussians.means), &exact.means, 1e-4);
-                assert_close_relative(&what("scales"), &values_of(&gaussians.scales), &exact.scales, 1e-4);
+                assert_close_relative(&what("means"), &values_of(&gaussians.means()), &exact.means, 1e-4);
+                assert_close_relative(&what("scales"), &values_of(&gaussians.scales()), &exact.scales, 1e-4);
             }
         }
     }
