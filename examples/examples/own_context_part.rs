@@ -171,7 +171,7 @@ pub(crate) fn main() -> Outcome {
     };
     let exact = plane_distributions(arrays, &coding, XZ)?;
     let ours = model.plane_parameters(&planes, &steps, &[XZ], Latent::Rounded).remove(0);
-    for (ours, exact) in [(ours.means, exact.means), (ours.scales, exact.scales)] {
+    for (ours, exact) in [(ours.means(), exact.means), (ours.scales(), exact.scales)] {
         let ours: Vec<f32> = ours.into_data().iter::<f32>().collect();
         let worst = ours.iter().zip(&exact).map(|(a, b)| (a - b).abs() / b.abs().max(1.0)).fold(0.0, f32::max);
         println!("largest relative difference between Burn and the codec: {worst:e}");

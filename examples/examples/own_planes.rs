@@ -176,7 +176,7 @@ pub(crate) fn main() -> Outcome {
     for (plane, name) in names.iter().enumerate() {
         let exact = plane_distributions(&arrays.feature_planes, &coding, plane)?;
         let ours = model.plane_parameters(&planes, &steps, &[plane], Latent::Rounded).remove(0);
-        for (ours, exact) in [(ours.means, exact.means), (ours.scales, exact.scales)] {
+        for (ours, exact) in [(ours.means(), exact.means), (ours.scales(), exact.scales)] {
             let ours: Vec<f32> = ours.into_data().iter::<f32>().collect();
             let worst = ours.iter().zip(&exact).map(|(a, b)| (a - b).abs() / b.abs().max(1.0)).fold(0.0, f32::max);
             assert!(worst < 1e-4, "plane {name}: Burn and the codec differ by {worst:e}");

@@ -1,7 +1,9 @@
 //! Golden cases c04 (entropy bottlenecks) and c05 (Gaussian conditional) on every back end.
 
 use burn::tensor::{Device, Distribution, Gradients, Tensor};
-use light4gs_model::gaussian_conditional::{LIKELIHOOD_BOUND, NormalParameters, bits, gaussian_bits, gaussian_likelihood};
+use light4gs_model::gaussian_conditional::{
+    LIKELIHOOD_BOUND, NormalParameters, bits, gaussian_bits, gaussian_likelihood,
+};
 use light4gs_model::ops::lower_bound::lower_bound;
 use light4gs_model::{
     EntropyBottleneck, EntropyBottleneckConfig, FactorizedDensity, Latent, PlainDensity, PlaneTensors, ShBottleneck,
