@@ -47,11 +47,11 @@ keys! {
 choice! {
     /// The parts of a file that are entropy coded.
     pub enum FileProfile: "profile" {
-        /// Everything.
+        /// Everything is coded.
         Compact = "compact",
-        /// Planes and spherical harmonics; the rest is float32, as in the paper.
+        /// Planes and spherical harmonics are coded; the rest is float32, as in the paper.
         Paper = "paper",
-        /// Nothing.
+        /// Nothing is coded.
         Float32 = "float32",
     }
 }

@@ -50,8 +50,9 @@ pub(super) struct Study {
     /// the file is written share one training.
     #[arg(long)]
     out: Option<PathBuf>,
-    /// The preset or TOML file that variants start from, in place of the study's own or of hexplane-dnerf-cpu; {scene} in
-    /// this name stands for the scene's name. A value that names its own keeps it.
+    /// The preset or TOML file that variants start from, in place of the study's own or of hexplane-dnerf-cpu; {scene}
+    /// in this name stands for the scene's name. If a value of an axis of the study names a preset of its own, the
+    /// value keeps that preset.
     #[arg(long, value_name = "PRESET|FILE")]
     config: Option<String>,
     /// Factor by which the length of every variant's schedule is multiplied, such as 0.25 for a first look.
@@ -68,8 +69,8 @@ pub(super) struct Study {
     /// deviations.
     #[arg(long, default_value_t = 1, value_parser = clap::value_parser!(u64).range(1..=1000))]
     seeds: u64,
-    /// Folder of another study. If one of its finished runs trained just as a run of this study would, its training is
-    /// reused, not repeated. May be given more than once.
+    /// Folder of another study. If a finished run of that study trained just as a run of this study would, this
+    /// training is reused, not repeated. May be given more than once.
     #[arg(long, value_name = "STUDY")]
     reuse: Vec<PathBuf>,
     /// Train only the runs that have these parts, such as 400,small,seed-0, in their names SCENE/VALUE+VALUE/seed-K. If
