@@ -162,7 +162,7 @@ keys! {
         /// Learning rate of the entropy model of the spherical harmonics, and of the densities of other attributes, at the end
         /// of the fine stage.
         learning_rate_final: f64 = 5e-4; RATE, "ours";
-        /// As `compression.steps.search_tolerance`, but for the step `compression.sh.step`.
+        /// The same as `compression.steps.search_tolerance`, but for the step `compression.sh.step`.
         search_tolerance: f64 = 0.0; DECIBELS, "ours";
     }
 }

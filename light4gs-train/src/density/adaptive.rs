@@ -36,7 +36,7 @@ keys! {
         /// Screen-space gradient above which a Gaussian is cloned or split, at the start of the fine stage.
         grad_threshold_fine_init: f32 = 2e-4; THRESHOLD, "reference";
         /// Screen-space gradient above which a Gaussian is cloned or split, at the iteration `until` of the fine stage.
-        /// Until then, the threshold changes linearly from `grad_threshold_fine_init`.
+        /// Up to this iteration, the threshold changes linearly from `grad_threshold_fine_init`.
         grad_threshold_fine_final: f32 = 2e-4; THRESHOLD, "reference";
         /// Gaussians up to this share of the scene's extent are cloned, and larger ones are split in two.
         percent_dense: f32 = 0.01; Number { least: 1e-9, most: 1e9 }, "3DGS";
@@ -48,7 +48,7 @@ keys! {
         /// Opacity below which a Gaussian counts as faint and is removed, at the start of the fine stage.
         opacity_threshold_fine_init: f32 = 0.005; SHARE, "reference";
         /// Opacity below which a Gaussian counts as faint and is removed, at the iteration `until` of the fine stage.
-        /// Until then, the threshold changes linearly from `opacity_threshold_fine_init`.
+        /// Up to this iteration, the threshold changes linearly from `opacity_threshold_fine_init`.
         opacity_threshold_fine_final: f32 = 0.005; SHARE, "reference";
         /// The removal of faint Gaussians starts after this iteration.
         prune_from: usize = 500; ITERATION, "reference";

@@ -26,8 +26,8 @@ keys! {
             PruneVolume::BOUNDS, "paper";
         /// Exponent in the factor of `train.prune.volume`.
         volume_exponent: f64 = 0.1; Number { least: 1e-6, most: 3.0 }, "LightGaussian";
-        /// A pass uses one random camera for each time instead of every training view. This is meant for data with many
-        /// cameras.
+        /// Whether a pass of pruning uses one random camera for each time instead of every training view. Such a pass
+        /// is meant for data with many cameras.
         one_camera_per_time: bool = false; Flag, "paper, multi-view data";
     }
 }
@@ -45,9 +45,10 @@ choice! {
 choice! {
     /// The factor of a Gaussian's volume in its significance.
     pub enum PruneVolume: "volume" {
-        /// 1.
+        /// The factor is 1.
         None = "none",
-        /// clamp(V / V_90, 0, 1)^exponent, where 90 % of the volumes are below V_90. This is the paper's factor.
+        /// The factor is clamp(V / V_90, 0, 1)^exponent, where 90 % of the volumes are below V_90. This is the paper's
+        /// factor.
         Clamped = "clamped",
     }
 }

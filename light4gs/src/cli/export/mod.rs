@@ -82,8 +82,8 @@ pub(super) struct Export {
     /// Dataset whose cameras the page offers; by default the dataset of the run whose folder holds the file.
     #[arg(long, conflicts_with = "out")]
     scene: Option<PathBuf>,
-    /// Number of frames from time 0 to time 1; in a .glb, number of keyframes. By default as many as the file was made
-    /// from.
+    /// Number of frames from time 0 to time 1; in a .glb, number of keyframes. By default, as many frames as the file
+    /// was made from.
     #[arg(long, value_parser = clap::value_parser!(u32).range(1..=i64::from(MOST_FRAMES)), allow_negative_numbers = true)]
     frames: Option<u32>,
     /// A single time, in [0, 1], for a .ply or .glb file. An output that can hold only one time gets time 0 by default.

@@ -65,17 +65,17 @@ pub(super) struct Study {
     /// such as wgpu:0.
     #[arg(long)]
     device: Option<DeviceName>,
-    /// Number of runs of each variant on each scene, each with a seed of its own. Tables then show means and standard
-    /// deviations.
+    /// Number of runs of each variant on each scene, each with a seed of its own. With several seeds, tables show means
+    /// and standard deviations.
     #[arg(long, default_value_t = 1, value_parser = clap::value_parser!(u64).range(1..=1000))]
     seeds: u64,
     /// Folder of another study. If a finished run of that study trained just as a run of this study would, this
-    /// training is reused, not repeated. May be given more than once.
+    /// training is reused, not repeated. This option may be given more than once.
     #[arg(long, value_name = "STUDY")]
     reuse: Vec<PathBuf>,
     /// Train only the runs that have these parts, such as 400,small,seed-0, in their names SCENE/VALUE+VALUE/seed-K. If
-    /// several scenes, several values of one axis or several seeds are given, a run needs only one of them. The other
-    /// runs stay missing.
+    /// several scenes are given, a run needs only one of them; the same holds for several values of one axis and for
+    /// several seeds. Runs without the parts stay missing.
     #[arg(long, value_delimiter = ',', value_name = "PART")]
     only: Vec<String>,
     /// Print the runs, without training.

@@ -77,7 +77,8 @@ keys! {
         opacity: f64 = 0.15; Number { least: 1e-4, most: 0.999 }, "ours";
         /// Every Gaussian learns a stillness: its skinning logit for an additional node that never moves.
         stillness: bool = true; Flag, "ours";
-        /// Stillness at the beginning. For comparison: a Gaussian at a node's anchor has a logit of 0 for that node.
+        /// Stillness at the beginning. For comparison: a Gaussian at a node's anchor has a skinning logit of 0 for that
+        /// node.
         stillness_start: f64 = -4.0; Number { least: -30.0, most: 30.0 }, "ours";
         /// Every Gaussian learns a lifetime, a bell curve over time by which its opacity is multiplied. Lifetimes begin
         /// with the iteration at which the sampler's window of time holds all times.
