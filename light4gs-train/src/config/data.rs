@@ -93,15 +93,15 @@ keys! {
         /// How images are grouped into cameras, in the layouts `colmap` and `nerfstudio`.
         cameras: CamerasKind = CamerasKind::Auto; CamerasKind::BOUNDS, "ours";
         /// Whether the times of a rig's camera are shifted if this camera is some frames ahead of the other cameras, or
-        /// behind them. If off, `train` and `check` only report such cameras.
+        /// behind them. If off, `train` and `check` only report cameras that are ahead or behind.
         synchronize: bool = false; Flag, "ours";
         /// Upper bound of the memory for decoded images. Images that do not fit are decoded again, ahead of the
         /// iterations that need them.
         memory_limit_mib: u64 = 2048; Whole { least: 16, most: 1 << 24 }, "ours";
         /// Number of Gaussians at the start, where the dataset has no point cloud.
         initial_points: usize = 2000; Whole { least: 4, most: MOST_GAUSSIANS }, "reference, D-NeRF";
-        /// Half the side of the cube around the origin in which the initial Gaussians are scattered, if the dataset has
-        /// no point cloud; world units.
+        /// Half the side, in world units, of the cube around the origin in which the initial Gaussians are scattered,
+        /// if the dataset has no point cloud.
         initial_box: f32 = 1.3; Number { least: 1e-6, most: 1e6 }, "reference, D-NeRF";
     }
 }

@@ -22,8 +22,8 @@ keys! {
         interval: usize = 1000; ITERATION, "ours";
         /// Number of test views for the measurements of PSNR during training.
         views: usize = 4; ITERATION, "ours";
-        /// Files with the weights of LPIPS ([metrics.md](metrics.md)). Without such files LPIPS is not measured, and
-        /// the columns of LPIPS say so.
+        /// Files with the weights of LPIPS ([metrics.md](metrics.md)). Without files of weights, LPIPS is not measured,
+        /// and the columns of LPIPS say so.
         lpips: Vec<PathBuf> = Vec::new();
             List { element: &Text, length: None }, "ours";
     }

@@ -54,9 +54,9 @@ pub(super) struct Export {
     /// time (--at) or the base alone (--base). With --to glb, each segment of a take gets a .glb.
     #[arg(long, required_unless_present_any = ["html", "site"])]
     out: Option<PathBuf>,
-    /// Kind of the files in the folder. ply: there is a file for each frame. glb (for takes only): there is a file for
-    /// each segment, with the segment's motion and what stands still around it. For a take there are also `base.glb`,
-    /// with what stands still over the whole take, and `segments.json`, with the times of each segment.
+    /// Kind of the files in the folder. With ply, there is a file for each frame. With glb, for takes only, there is a
+    /// file for each segment, with the segment's motion and what stands still around it. With glb there are also
+    /// `base.glb`, with what stands still over the whole take, and `segments.json`, with the times of each segment.
     #[arg(long, value_enum, value_name = "KIND", default_value = "ply")]
     to: FolderOf,
     /// A single time of a take in seconds, for a .ply or .glb file.
