@@ -85,7 +85,7 @@ impl fmt::Display for Divergence {
     }
 }
 
-/// The key of an attribute's learning rate at the first step.
+/// The key of an attribute's learning rate at the first training step.
 fn attribute_key(name: &str) -> String {
     format!("train.learning_rate.attributes_init.{name}")
 }

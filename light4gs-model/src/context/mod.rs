@@ -61,7 +61,7 @@ choice! {
         InterPlane = "inter_plane",
         /// Higher scales are predicted from the scale below.
         InterScale = "inter_scale",
-        /// The reference's: a transmitted latent for higher scales too, with the inter-scale context beside it.
+        /// As in the reference, a transmitted latent for higher scales too, beside the inter-scale context.
         HighScaleHyperprior = "high_scale_hyperprior",
     }
 }

@@ -78,11 +78,11 @@ impl Pca {
 keys! {
     /// The mapping from world coordinates to the coordinates of the planes (paper III-A).
     pub struct CoordinatesConfig {
-        /// The planes lie along the principal axes of the initial cloud. Off: along the world's axes, scaled by the
-        /// cloud's standard deviation along each.
+        /// Whether the planes lie along the principal axes of the initial cloud. If off, they lie along the world's
+        /// axes, each scaled by the cloud's standard deviation along this axis.
         pca: bool = true; Flag, "paper";
-        /// Points more than one standard deviation away from the cloud's center are contracted. Off: the whole cloud is
-        /// scaled into the ball that contraction would not change. This ball is half as wide as the planes.
+        /// Whether points more than one standard deviation away from the cloud's center are contracted. If off, the
+        /// whole cloud is scaled into the ball that contraction would not change, which is half as wide as the planes.
         contraction: bool = true; Flag, "paper";
     }
 }

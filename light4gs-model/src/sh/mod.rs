@@ -142,10 +142,9 @@ impl ShKind {
 keys! {
     /// The model of the spherical harmonics beyond degree 0.
     pub struct ShConfig {
-        /// Entropy model of the spherical harmonics beyond degree 0. It is trained for degree 3. Scenes of a lower
-        /// degree have none. The densities of `"factorized"` and `"mixture_of_logistics"` are the same for all
-        /// Gaussians. In the `compact` profile the file does not use these two, because prediction from neighbors saves
-        /// more.
+        /// Entropy model of the spherical harmonics beyond degree 0. Only scenes of degree 3 have such a model. The
+        /// densities of `"factorized"` and `"mixture_of_logistics"` are the same for all Gaussians. In the `compact`
+        /// profile the file does not use these two models, because prediction from neighbors saves more.
         model: ShKind = ShKind::Factorized; ShKind::BOUNDS, "paper";
         /// Quantization step of the spherical harmonics beyond degree 0.
         step: f64 = 0.02; QUANTIZATION_STEP, "paper";

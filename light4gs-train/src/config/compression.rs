@@ -17,15 +17,16 @@ keys! {
             FileProfile::BOUNDS,
             "ours; paper";
         /// Upper bound of the file in bytes; the file uses nearly all of it. Training adapts the weight of the rate, and the
-        /// encoder adapts the steps of the attributes. 0: no bound; the size follows from lambda and the steps.
+        /// encoder adapts the steps of the attributes. 0 means no bound; then the size follows from lambda and the
+        /// quantization steps.
         target_bytes: usize = 0; Whole { least: 0, most: 1_000_000_000_000 }, "ours";
         /// Lower bound of the PSNR of the decoded file on the test views (on the training views if there are none), in
-        /// dB. The file is hardly better, since the weight of the rate and the steps are adapted as with
-        /// `target_bytes`. 0: no bound.
+        /// dB. The file is hardly better than this bound, since the weight of the rate and the quantization steps are
+        /// adapted as with `target_bytes`. 0 means no bound.
         target_db: f64 = 0.0; DECIBELS, "ours";
-        /// Layers of Gaussians in the file, the most significant ones first: with more than 1 a player shows a coarse
-        /// scene after the first few bytes. Each layer has twice as many Gaussians as the one before. More layers take
-        /// some percent more bytes. A file of the profile `float32` has only one layer.
+        /// Number of layers of Gaussians in the file, the most significant Gaussians first. With more than 1 layer, a
+        /// player shows a coarse scene after the first few bytes. Each layer has twice as many Gaussians as the layer
+        /// before. More layers take some percent more bytes. A file of the profile `float32` has only one layer.
         layers: usize = GaussianLayers::default().count as usize;
             Whole { least: 1, most: GaussianLayers::MOST as u64 }, "ours";
         /// The rate in the loss.
@@ -46,11 +47,11 @@ keys! {
 choice! {
     /// The parts of a file that are entropy coded.
     pub enum FileProfile: "profile" {
-        /// Everything.
+        /// Everything is coded.
         Compact = "compact",
-        /// Planes and spherical harmonics; the rest is float32, as in the paper.
+        /// Planes and spherical harmonics are coded; the rest is float32, as in the paper.
         Paper = "paper",
-        /// Nothing.
+        /// Nothing is coded.
         Float32 = "float32",
     }
 }
@@ -69,24 +70,24 @@ impl FileProfile {
 keys! {
     /// The rate term of the loss.
     pub struct RateConfig {
-        /// Weight of the rate in the loss. 0: the scene is trained without the rate, and the entropy models are fitted
-        /// to the finished scene.
+        /// Weight of the rate in the loss. With 0, the scene is trained without the rate, and the entropy models are
+        /// fitted to the finished scene.
         lambda: f64 = 0.0;
             WEIGHT, "ours; the reference's log of *bouncing balls* has 0.001 per symbol";
         /// The unit of the rate that lambda multiplies.
         weighting: RateWeighting = RateWeighting::Megabytes;
             RateWeighting::BOUNDS, "ours; paper";
-        /// The rate of the planes has a gradient with respect to the planes. Off: their entropy model is trained, but
-        /// the planes are not trained for a low rate.
+        /// Whether the rate of the planes has a gradient with respect to the planes. If off, the entropy model of the
+        /// planes is trained, but the planes are not trained for a low rate.
         planes: bool = true;
             Flag, "ours, for the ablation";
-        /// The rate of the spherical harmonics has a gradient with respect to the harmonics. Off: their entropy model
-        /// is trained, but the harmonics are not trained for a low rate.
+        /// Whether the rate of the spherical harmonics has a gradient with respect to the harmonics. If off, the
+        /// entropy model of the harmonics is trained, but the harmonics are not trained for a low rate.
         sh: bool = true; Flag, "ours, for the ablation";
-        /// Once densification is over, those attributes that no other entropy model describes have quantization noise,
-        /// a rate and learned steps too. In scenes of degree 1 or 2, spherical harmonics are among these attributes.
-        /// Off: the encoder searches for the steps of these attributes. Only the `compact` profile quantizes all of
-        /// them in the file; the `paper` profile quantizes only the spherical harmonics.
+        /// Whether the attributes that no other entropy model describes also have quantization noise, a rate and
+        /// learned steps, once densification is over. In scenes of degree 1 or 2, spherical harmonics are among these
+        /// attributes. If off, the encoder searches for the steps of these attributes. Only the `compact` profile
+        /// quantizes all of these attributes in the file; the `paper` profile quantizes only the spherical harmonics.
         attributes: bool = false; Flag, "ours, after HAC++";
         /// Weight, in the loss, of a megabyte of those attributes to which `compression.rate.attributes` gives a rate.
         attribute_lambda: f64 = 0.03; WEIGHT, "ours";
@@ -95,10 +96,10 @@ keys! {
         /// Share of the planes, and of the Gaussians, on which the rate is estimated. The estimate is unbiased.
         fraction: f64 = 0.125; Number { least: 1e-6, most: 1.0 }, "ours";
         /// From this iteration of the fine stage on, the planes have quantization noise and the rate is part of the
-        /// loss. Spherical harmonics follow when densification is over.
+        /// loss. For spherical harmonics, both begin when densification is over.
         from: usize = 1000; ITERATION, "reference: 3; SH 2000";
         /// Iteration of the fine stage after which the planes are frozen: they take the values that the file will have,
-        /// and only the rest of the scene is still trained. 0: never.
+        /// and only the rest of the scene is still trained. 0 means never.
         planes_until: usize = 27_000;
             ITERATION, "ours";
     }
@@ -120,11 +121,11 @@ keys! {
         /// Its parts and sizes.
         #[serde(flatten)]
         model: ContextConfig;
-        /// Learning rate of the context model at the first step.
+        /// Learning rate of the context model at the first training step.
         learning_rate_init: f64 = 5e-3; RATE, "ours";
         /// Learning rate of the context model at the end of the fine stage.
         learning_rate_final: f64 = 5e-4; RATE, "ours";
-        /// Steps that fit entropy models to a scene that was trained without them.
+        /// Training steps that fit the entropy models to a scene that was trained without them.
         fit_iterations: usize = 1500; Whole { least: 1, most: 1_000_000 }, "ours";
     }
 }
@@ -135,15 +136,16 @@ keys! {
         /// The steps at the start.
         #[serde(flatten)]
         initial: AdaptiveQuantizationConfig;
-        /// The steps are learned. They become coarser than at the start where that pays, but never finer: finer steps help
-        /// training frames only ([results](notebook/2026-11-23-hexplane.md#learned-quantization-steps)).
+        /// Whether the steps are learned. Learned steps become coarser than at the start where that pays, but never
+        /// finer, since finer steps help only training frames
+        /// ([results](notebook/2026-11-23-hexplane.md#learned-quantization-steps)).
         adaptive: bool = true; Flag, "paper; dropped by the reference";
         /// Iteration of the fine stage from which the steps are learned.
         adaptive_from: usize = 15_000; ITERATION, "paper";
         /// Learning rate of the logarithms of steps, for the steps of planes and of attributes.
         learning_rate: f64 = 2e-3; RATE, "ours";
-        /// For a scene that was trained without a rate, such as an imported one: the encoder searches for the coarsest
-        /// steps that cost at most this much PSNR, in dB. 0: the steps are used as they are.
+        /// If a scene was trained without a rate, as imported scenes are, the encoder searches for the coarsest steps
+        /// that cost at most this much PSNR, in dB. With 0, the steps are used as they are.
         search_tolerance: f64 = 0.0; DECIBELS, "ours";
     }
 }
@@ -155,12 +157,12 @@ keys! {
         #[serde(flatten)]
         entropy: ShConfig;
         /// Learning rate of the entropy model of the spherical harmonics, and of the densities of other attributes, at
-        /// the first step.
+        /// the first training step.
         learning_rate_init: f64 = 5e-3; RATE, "ours";
         /// Learning rate of the entropy model of the spherical harmonics, and of the densities of other attributes, at the end
         /// of the fine stage.
         learning_rate_final: f64 = 5e-4; RATE, "ours";
-        /// As `compression.steps.search_tolerance`, but for the step `compression.sh.step`.
+        /// The same as `compression.steps.search_tolerance`, but for the step `compression.sh.step`.
         search_tolerance: f64 = 0.0; DECIBELS, "ours";
     }
 }
@@ -168,15 +170,15 @@ keys! {
 keys! {
     /// Quantization of the attributes other than the spherical harmonics beyond degree 0.
     pub struct AttributesConfig {
-        /// Steps by the attributes' names, in the `compact` profile. The step of `means` is a share of the typical
-        /// Gaussian's size; other steps are in units of the trained numbers. Further attributes, such as `stillness` of
-        /// control nodes or one of a field of your own, can be named as well. If such an attribute is not named, it has
-        /// the step that the field gives it. The search of `compression.attributes.search_tolerance` starts from these
-        /// steps.
+        /// Quantization steps by the attributes' names, for the `compact` profile. The step of `means` is a share of
+        /// the typical Gaussian's size; other steps are in units of the trained numbers. Further attributes, such as
+        /// `stillness` of control nodes or an attribute of a field of your own, can be named as well. If a further
+        /// attribute is not named, it has the step that its field gives it. The search of
+        /// `compression.attributes.search_tolerance` starts from these steps.
         steps: ByName = built_in(step_of);
             Bounds::ByName(&QUANTIZATION_STEP), "ours";
         /// The encoder searches for the coarsest steps that cost at most this much PSNR on some training views, in dB.
-        /// 0: the steps are used as they are.
+        /// With 0, the steps are used as they are.
         search_tolerance: f64 = 0.05; DECIBELS, "ours";
     }
 }

@@ -16,7 +16,7 @@ choice! {
         Auto = "auto",
         /// The last number in the images' names.
         Number = "number",
-        /// The natural order of each camera's names, one step per name.
+        /// The place of the image's name in the natural order of its camera's names.
         Order = "order",
     }
 }
@@ -59,49 +59,49 @@ impl From<CamerasKind> for CamerasFrom {
 keys! {
     /// Images, and the cloud that training starts from.
     pub struct DataConfig {
-        /// Layout of the dataset, such as `dnerf`; [data.md](data.md) has all layouts. Empty: the layout is found by
-        /// content. `train --format` sets it.
+        /// Layout of the dataset, such as `dnerf`; [data.md](data.md) has all layouts. If empty, the layout is found by
+        /// content. `train --format` sets this key.
         #[serde(with = "optional")]
         layout: Option<String> = None;
             NameOrNone { what: "layout", none: "found by content", names: || Layouts::default().names() },
             "ours";
         /// Length of the sequence in frames; later frames are left out. Where the dataset numbers its frames (`neu3d`),
-        /// frame `i` has the time `i` divided by this. 0: all frames.
+        /// frame `i` has the time `i` divided by this length. 0 means all frames.
         #[serde(with = "optional")]
         frames: Option<usize> = None;
             WholeOrNone { least: 1, most: 1_000_000 },
             "reference, Neu3D: 300";
-        /// Frames per second of the capture, from which its length in seconds follows. Below 0.001: the frame rate that
-        /// the capture's files state, if they state one.
+        /// Frames per second of the capture, from which its length in seconds follows. A number below 0.001 means the
+        /// frame rate that the capture's files state, if they state one.
         frames_a_second: f64 = 0.0; Number { least: 0.0, most: 1e5 }, "ours";
         /// First and last time of the images that are used, as shares of the capture. In the run of a take's segment,
         /// these are the times on which the segment is trained.
         between: [f64; 2] = [0.0, 1.0]; List { element: &SHARE, length: Some(2) }, "ours";
-        /// Largest number of times that are used, spread evenly. 0: all times are used.
+        /// Largest number of times that are used. The used times are spread evenly. 0 means that all times are used.
         #[serde(with = "optional")]
         most_times: Option<usize> = None; WholeOrNone { least: 1, most: 1_000_000 }, "ours";
-        /// Larger images are reduced so that their longer side has this many pixels, keeping their shape. 0 leaves all as
-        /// they are. `train --pixels` sets it.
+        /// Largest number of pixels of an image's longer side; larger images are reduced to it, keeping their shape. 0
+        /// leaves all images as they are. `train --pixels` sets this key.
         #[serde(with = "optional")]
         resolution: Option<u32> = None;
             WholeOrNone { least: 8, most: 16_384 }, "ours";
         /// Color behind transparent pixels, each channel 0 to 1.
         background: [f32; 3] = [1.0; 3]; List { element: &SHARE, length: Some(3) }, "reference, D-NeRF: white";
         /// Where the times of images come from, if a dataset in the layout `colmap` or `nerfstudio` has none. `light4gs
-        /// check` says what was read.
+        /// check` prints which of these was read.
         times: TimesKind = TimesKind::Auto; TimesKind::BOUNDS, "ours";
         /// How images are grouped into cameras, in the layouts `colmap` and `nerfstudio`.
         cameras: CamerasKind = CamerasKind::Auto; CamerasKind::BOUNDS, "ours";
-        /// Whether the times of a rig's camera are shifted if it is some frames ahead of the other cameras, or behind
-        /// them. Off: `train` and `check` only report such cameras.
+        /// Whether the times of a rig's camera are shifted if this camera is some frames ahead of the other cameras, or
+        /// behind them. If off, `train` and `check` only report cameras that are ahead or behind.
         synchronize: bool = false; Flag, "ours";
         /// Upper bound of the memory for decoded images. Images that do not fit are decoded again, ahead of the
         /// iterations that need them.
         memory_limit_mib: u64 = 2048; Whole { least: 16, most: 1 << 24 }, "ours";
         /// Number of Gaussians at the start, where the dataset has no point cloud.
         initial_points: usize = 2000; Whole { least: 4, most: MOST_GAUSSIANS }, "reference, D-NeRF";
-        /// Half the side of the cube around the origin in which the initial Gaussians are scattered, if the dataset has
-        /// no point cloud; world units.
+        /// Half the side, in world units, of the cube around the origin in which the initial Gaussians are scattered,
+        /// if the dataset has no point cloud.
         initial_box: f32 = 1.3; Number { least: 1e-6, most: 1e6 }, "reference, D-NeRF";
     }
 }

@@ -18,12 +18,12 @@ keys! {
         fps_warmup: usize = 5; Whole { least: 0, most: 1_000_000 }, "ours";
         /// Frames over which the frame rate is measured.
         fps_frames: usize = 50; Whole { least: 1, most: 1_000_000 }, "ours";
-        /// Iterations between two measurements of test PSNR during training. 0: never measured.
+        /// Iterations between two measurements of test PSNR during training. 0 means never.
         interval: usize = 1000; ITERATION, "ours";
         /// Number of test views for the measurements of PSNR during training.
         views: usize = 4; ITERATION, "ours";
-        /// Files with the weights of LPIPS ([metrics.md](metrics.md)). Without such files LPIPS is not measured, and
-        /// the columns of LPIPS say so.
+        /// Files with the weights of LPIPS ([metrics.md](metrics.md)). Without files of weights, LPIPS is not measured,
+        /// and the columns of LPIPS say so.
         lpips: Vec<PathBuf> = Vec::new();
             List { element: &Text, length: None }, "ours";
     }
@@ -32,11 +32,11 @@ keys! {
 choice! {
     /// A split whose images are compared with renders.
     pub enum EvalSplit: "split" {
-        /// Frames that are never trained.
+        /// Frames that are never trained on.
         Test = "test",
-        /// Further frames that are never trained.
+        /// Further frames that are never trained on.
         Val = "val",
-        /// Frames that are trained.
+        /// Frames that are trained on.
         Train = "train",
     }
 }

@@ -16,9 +16,9 @@ keys! {
         sh_degree: u8 = 3; Whole { least: 0, most: 3 }, "3DGS";
         /// What moves the Gaussians. The keys of each field are in the tables below.
         field: FieldKind = FieldKind::HexPlane; FieldKind::BOUNDS, "paper";
-        /// A `.l4gs` file of a scene that stands still. Its Gaussians are drawn together with the run's own, but are
-        /// not trained. A relative path starts at the folder of the run. Empty: none. `train --segment` sets it for the
-        /// segments of a take.
+        /// A `.l4gs` file of a scene that stands still. The Gaussians of this scene are drawn together with the run's
+        /// own, but are not trained. A relative path starts at the folder of the run. Empty means no such file. `train
+        /// --segment` sets this key for the segments of a take.
         #[serde(with = "optional")]
         base: Option<PathBuf> = None; Text, "ours";
         /// From world coordinates to those of the planes.

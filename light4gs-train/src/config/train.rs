@@ -17,7 +17,7 @@ keys! {
     pub struct TrainConfig {
         /// Iterations of the coarse stage: static Gaussians, no deformation.
         coarse_iterations: usize = 3000; ITERATIONS, "paper";
-        /// Iterations of the fine stage. They are counted from 1 again, and the optimizer is a new one.
+        /// Iterations of the fine stage, which are counted from 1 again. The fine stage begins with a new optimizer.
         fine_iterations: usize = 30_000; ITERATIONS, "paper: 30000 for D-NeRF, 20000 elsewhere";
         /// Frames per iteration.
         batch_size: usize = 1; Whole { least: 1, most: 1024 }, "paper: 1 for D-NeRF, 2 to 4 elsewhere";
@@ -86,13 +86,13 @@ impl TrainConfig {
 }
 
 keys! {
-    /// Training begins with smaller images, and with fewer Gaussians for them. Such an iteration takes a fraction of
-    /// the time. In the coarse stage, images have the size with which the fine stage begins. No side of an image is
-    /// made shorter than 200 pixels.
+    /// Training begins with smaller images, and with fewer Gaussians for them. An iteration with smaller images takes a
+    /// fraction of the time. In the coarse stage, images have the size with which the fine stage begins. No side of an
+    /// image is made shorter than 200 pixels.
     pub struct CoarseToFineConfig {
-        /// Images have a quarter of their width and height until this share of the fine stage is over. 0: never.
+        /// Images have a quarter of their width and height until this share of the fine stage is over. 0 means never.
         quarter_until: f64 = 0.0; SHARE, "ours";
-        /// Images have half of their width and height until this share of the fine stage is over. 0: never.
+        /// Images have half of their width and height until this share of the fine stage is over. 0 means never.
         half_until: f64 = 0.0; SHARE, "ours";
     }
 }
@@ -118,30 +118,30 @@ keys! {
     /// Adam's learning rates. A rate with an `init` and a `final` value decays exponentially from one to the other. The
     /// rates of positions, deformation and feature planes are multiplied by the scene's extent.
     pub struct LearningRates {
-        /// Learning rate of the deformation network at the first step.
+        /// Learning rate of the deformation network at the first training step.
         deformation_init: f64 = 1.6e-4; RATE, "reference";
         /// Learning rate of the deformation network at the end of the schedule.
         deformation_final: f64 = 1.6e-5; RATE, "reference";
-        /// Learning rate of the feature planes at the first step.
+        /// Learning rate of the feature planes at the first training step.
         planes_init: f64 = 1.6e-3; RATE, "reference";
         /// Learning rate of the feature planes at the end of the schedule.
         planes_final: f64 = 1.6e-4; RATE, "reference";
-        /// Learning rates of the Gaussians' attributes at the first step. Further attributes, such as `stillness` of
-        /// control nodes or one of a field of your own, can be named as well. If such an attribute is not named, it has
-        /// the rate that the field gives it.
+        /// Learning rates of the Gaussians' attributes at the first training step. Further attributes, such as
+        /// `stillness` of control nodes or an attribute of a field of your own, can be named as well. If a further
+        /// attribute is not named, it has the learning rate that its field gives it.
         attributes_init: ByName = built_in(|attribute| Some(attribute.learning_rate.initial));
             Bounds::ByName(&RATE), "3DGS";
         /// Learning rates of the Gaussians' attributes at the end of the schedule. An attribute that is not named here
-        /// keeps its rate, unless its field gives it another one.
+        /// keeps its learning rate of the beginning, unless its field gives another one.
         attributes_final: ByName = built_in(|attribute| attribute.learning_rate.last);
             Bounds::ByName(&RATE), "3DGS";
-        /// Length of the decay in iterations. 0: the length of the stage.
+        /// Length of the decay in iterations. 0 means the length of the stage.
         #[serde(with = "optional")]
         schedule_steps: Option<usize> = None; ITERATION, "ours; reference: 20000";
-        /// Share of the fine stage, at its end, in which the rates of this table fall once more. So the noise of the
-        /// training steps is averaged away, after motion has been found. 0: none.
+        /// Share of the fine stage, at its end, in which all learning rates of this table fall once more. This cooldown
+        /// averages away the noise of the training steps, after motion has been found. 0 means no cooldown.
         cooldown: f64 = 0.0; SHARE, "ours; the last phase of warmup-stable-decay (Hu et al. 2024)";
-        /// Factor by which the rates have fallen at the end of the cooldown.
+        /// Factor by which the learning rates have fallen at the end of the cooldown.
         cooldown_factor: f64 = 0.1; Number { least: 1e-6, most: 1.0 }, "ours";
     }
 }

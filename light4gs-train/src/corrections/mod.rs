@@ -64,29 +64,29 @@ keys! {
 
 keys! {
     /// How corrections of exposures, poses and times are learned. The rates are Adam's learning rates at the beginning
-    /// and at the end of a run that looks at each frame or camera a hundred times. If a run looks less often, its rates
-    /// are larger in proportion, but at most three times as large. If it looks more often, they are smaller in
-    /// proportion, but at least a fifth.
+    /// and at the end of a run that looks at each frame or camera a hundred times. If a run looks at them less often,
+    /// its learning rates are larger in proportion, but at most three times as large. If a run looks at them more
+    /// often, its learning rates are smaller in proportion, but at least a fifth as large.
     pub struct CorrectionRates {
         /// Poses and times are corrected from this iteration on, since before it there is no scene to compare with.
         /// Iterations are counted over both stages.
         from: usize = 300; ITERATION, "ours";
-        /// Learning rate of exposures at the first step. This is the rate of the logarithms of gains. The rate of
-        /// offsets, in shares of white, is a quarter of it.
+        /// Learning rate of the logarithms of exposures' gains at the first training step. The learning rate of
+        /// exposures' offsets, in shares of white, is a quarter of this.
         exposure_init: f64 = 2e-2; CORRECTION_RATE, "ours";
         /// Learning rate of exposures at the end of the run.
         exposure_final: f64 = 2e-4; CORRECTION_RATE, "ours";
         /// Weight, in the loss, of the squared logarithms of gains and the squared offsets of exposures.
         exposure_weight: f32 = 0.02; WEIGHT, "ours";
-        /// Learning rate of the rotations of cameras at the first step, in radians.
+        /// Learning rate of the rotations of cameras at the first training step, in radians.
         turn_init: f64 = 1e-3; CORRECTION_RATE, "ours";
         /// Learning rate of the rotations of cameras at the end of the run, in radians.
         turn_final: f64 = 1e-5; CORRECTION_RATE, "ours";
-        /// Learning rate of the translations of cameras at the first step, in shares of the scene's extent.
+        /// Learning rate of the translations of cameras at the first training step, in shares of the scene's extent.
         translation_init: f64 = 5e-4; CORRECTION_RATE, "ours";
         /// Learning rate of the translations of cameras at the end of the run, in shares of the scene's extent.
         translation_final: f64 = 5e-6; CORRECTION_RATE, "ours";
-        /// Learning rate of the offsets of times at the first step, in intervals between two frames.
+        /// Learning rate of the offsets of times at the first training step, in intervals between two frames.
         time_init: f64 = 4e-2; CORRECTION_RATE, "ours";
         /// Learning rate of the offsets of times at the end of the run, in intervals between two frames.
         time_final: f64 = 4e-4; CORRECTION_RATE, "ours";

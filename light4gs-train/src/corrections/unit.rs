@@ -5,11 +5,11 @@ use light4gs_keys::choice;
 choice! {
     /// What has a correction of its own.
     pub enum CorrectionUnit: "unit of corrections" {
-        /// No corrections: the dataset is right.
+        /// The dataset is right, and nothing is corrected.
         None = "none",
-        /// Each camera of a rig.
+        /// Each camera of a rig has a correction of its own.
         Camera = "camera",
-        /// Each frame.
+        /// Each frame has a correction of its own.
         Frame = "frame",
     }
 }

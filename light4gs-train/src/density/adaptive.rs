@@ -36,25 +36,27 @@ keys! {
         /// Screen-space gradient above which a Gaussian is cloned or split, at the start of the fine stage.
         grad_threshold_fine_init: f32 = 2e-4; THRESHOLD, "reference";
         /// Screen-space gradient above which a Gaussian is cloned or split, at the iteration `until` of the fine stage.
-        /// Until then, the threshold changes linearly from `grad_threshold_fine_init`.
+        /// Up to this iteration, the threshold changes linearly from `grad_threshold_fine_init`.
         grad_threshold_fine_final: f32 = 2e-4; THRESHOLD, "reference";
         /// Gaussians up to this share of the scene's extent are cloned, and larger ones are split in two.
         percent_dense: f32 = 0.01; Number { least: 1e-9, most: 1e9 }, "3DGS";
-        /// Largest number of Gaussians. At this bound, those with the largest gradients are cloned or split first.
+        /// Largest number of Gaussians. At this bound, the Gaussians with the largest gradients are cloned or split
+        /// first.
         max_gaussians: usize = 360_000; Whole { least: 1, most: MOST_GAUSSIANS }, "reference; the largest first: ours";
         /// Opacity below which a Gaussian counts as faint and is removed, in the coarse stage.
         opacity_threshold: f32 = 0.005; SHARE, "3DGS";
         /// Opacity below which a Gaussian counts as faint and is removed, at the start of the fine stage.
         opacity_threshold_fine_init: f32 = 0.005; SHARE, "reference";
         /// Opacity below which a Gaussian counts as faint and is removed, at the iteration `until` of the fine stage.
-        /// Until then, the threshold changes linearly from `opacity_threshold_fine_init`.
+        /// Up to this iteration, the threshold changes linearly from `opacity_threshold_fine_init`.
         opacity_threshold_fine_final: f32 = 0.005; SHARE, "reference";
         /// The removal of faint Gaussians starts after this iteration.
         prune_from: usize = 500; ITERATION, "reference";
         /// Iterations between two removals of faint Gaussians.
         prune_interval: usize = 100; INTERVAL, "reference";
-        /// Faint Gaussians are removed only if there are more Gaussians than this. While there are fewer, all are kept,
-        /// so that fast objects, which are faint in the coarse stage, survive it. 0: always.
+        /// Faint Gaussians are removed only if there are more Gaussians than this. While there are fewer Gaussians, the
+        /// faint ones are kept too, so that fast objects survive the coarse stage, in which they are faint. 0 means
+        /// that faint Gaussians are always removed.
         prune_above: usize = 200_000;
             ITERATION, "reference: 200000";
         /// Iterations between two resets of the opacities; 0 = never.

@@ -5,14 +5,15 @@ use light4gs_keys::{INTERVAL, keys};
 
 keys! {
     /// Guided sampling adds Gaussians at those pixels of training frames that the rendering does not explain. Each new
-    /// Gaussian exists only around the time of its frame. It is meant for objects that are too fast to be followed.
-    /// Guided sampling needs Gaussians with lifetimes: `model.nodes.lifetime`.
+    /// Gaussian exists only around the time of its frame. Guided sampling is meant for objects that are too fast to be
+    /// followed. Guided sampling needs Gaussians with lifetimes: `model.nodes.lifetime`.
     pub struct GuidedSamplingConfig {
         /// Iterations of the fine stage after which Gaussians are added; empty = never.
         iterations: Vec<usize> = Vec::new();
             List { element: &INTERVAL, length: None }, "after Li et al. 2024";
-        /// Number of new Gaussians for each training time, at pixels of one frame of that time; fewer if few pixels are
-        /// unexplained. With the new ones, there may be more than `train.densify.adaptive.max_gaussians`.
+        /// Number of new Gaussians for each training time, at pixels of one frame of that time. The number is smaller
+        /// if few pixels are unexplained. With the new Gaussians, there may be more Gaussians than
+        /// `train.densify.adaptive.max_gaussians`.
         count: usize = 100; Whole { least: 1, most: 1_000_000 }, "ours";
         /// Standard deviation of the new Gaussians' lifetimes, in intervals between training times.
         lifetime: f64 = 0.6; Number { least: 0.01, most: 1e6 }, "ours";

@@ -5,16 +5,16 @@ use light4gs_keys::{INTERVAL, choice, keys};
 use light4gs_model::{PixelContribution as Sum, Sensitivity, Significance, VolumeWeight};
 
 keys! {
-    /// Significance pruning (STP, paper III-B). After densification, there are passes that each drop the Gaussians that
-    /// contribute least to the training views at the times of the views.
+    /// Significance pruning (STP, paper III-B). Passes of pruning follow densification. Each pass drops the Gaussians
+    /// that contribute least to the training views, at the times of these views.
     pub struct PruneConfig {
-        /// Share of the Gaussians that each pass drops; 0 = never. Two passes of 0.1, 0.2, 0.3, 0.4 drop 19, 36, 51,
-        /// 64 %.
+        /// Share of the Gaussians that each pass drops; 0 = never. Two passes with 0.1, 0.2, 0.3 or 0.4 together drop
+        /// 19, 36, 51 or 64 %.
         fraction: f64 = 0.0;
             Number { least: 0.0, most: 0.999 },
             "paper: 0.1 to 0.4";
-        /// Iterations of the fine stage after which a pass takes place. All of them must be after the end of
-        /// densification.
+        /// Iterations of the fine stage after which a pass takes place. All of these iterations must be after the end
+        /// of densification.
         iterations: Vec<usize> = vec![15_001, 20_000];
             List { element: &INTERVAL, length: None },
             "paper: mid-way and near the end";
@@ -26,7 +26,8 @@ keys! {
             PruneVolume::BOUNDS, "paper";
         /// Exponent in the factor of `train.prune.volume`.
         volume_exponent: f64 = 0.1; Number { least: 1e-6, most: 3.0 }, "LightGaussian";
-        /// A pass uses one random camera for each time instead of every training view; for data with many cameras.
+        /// Whether a pass of pruning uses one random camera for each time instead of every training view. Such a pass
+        /// is meant for data with many cameras.
         one_camera_per_time: bool = false; Flag, "paper, multi-view data";
     }
 }
@@ -44,9 +45,10 @@ choice! {
 choice! {
     /// The factor of a Gaussian's volume in its significance.
     pub enum PruneVolume: "volume" {
-        /// 1.
+        /// The factor is 1.
         None = "none",
-        /// clamp(V / V_90, 0, 1)^exponent, where 90 % of the volumes are below V_90. This is the paper's factor.
+        /// The factor is clamp(V / V_90, 0, 1)^exponent, where 90 % of the volumes are below V_90. This is the paper's
+        /// factor.
         Clamped = "clamped",
     }
 }

@@ -18,12 +18,11 @@ keys! {
         center: f64 = 0.5; SHARE, "ours";
         /// Number of different times in the first window.
         times: usize = 12; Whole { least: 1, most: 1_000_000 }, "ours";
-        /// Of the iterations that the fine stage has after the survey, the share during which the first window stays as
-        /// it is.
+        /// Share of the fine stage's iterations after the survey during which the first window stays as it is.
         held: f64 = 0.07; SHARE, "ours";
-        /// Of the iterations that the fine stage has after the survey, the share after which all times are seen.
+        /// Share of the fine stage's iterations after the survey until the window holds all times.
         open: f64 = 0.6; SHARE, "ours";
-        /// The share of the draws that go to the newest times while the window widens.
+        /// Share of the drawn frames that have the newest times, while the window widens.
         newest: f64 = 0.3; SHARE, "ours";
         /// Number of times at each end of the window that count as the newest.
         newest_times: usize = 4; Whole { least: 1, most: 1_000_000 }, "ours";

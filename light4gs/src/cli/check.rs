@@ -34,8 +34,8 @@ pub(super) struct Check {
     /// Changes one key of the configuration, such as data.times=order; may be given more than once.
     #[arg(long = "set", value_name = "KEY=VALUE")]
     overrides: Vec<String>,
-    /// Write a page that shows cameras and points from above, a contact sheet, and for each camera how much its images
-    /// change and how sharp they are.
+    /// Write a page that shows cameras and points from above, and a contact sheet. For each camera, the page also says
+    /// how much its images change and how sharp they are.
     #[arg(long, value_name = "FILE.html")]
     html: Option<PathBuf>,
     /// Print the result as JSON.

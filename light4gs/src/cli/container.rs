@@ -48,7 +48,8 @@ pub(super) struct Encode {
     /// that were learned in training are not used.
     #[arg(long = "set", value_name = "KEY=VALUE")]
     overrides: Vec<String>,
-    /// Upper bound of the file in bytes, such as 300k or 2M; the file comes close to it. Adapts the steps of attributes.
+    /// Upper bound of the file in bytes, such as 300k or 2M; the file comes close to it. This option adapts the
+    /// quantization steps of attributes.
     #[arg(long, value_name = "NUMBER", value_parser = bytes)]
     target_bytes: Option<usize>,
     /// Lower bound of the PSNR of the decoded file on the test views, dB: the smallest file above the bound is written.

@@ -20,10 +20,10 @@ use super::output::{say, tell};
 #[derive(Clone, Copy, Debug, ValueEnum)]
 enum Source {
     /// A checkpoint of 4DGaussians, or of the public code of Light4GS: the folder with `point_cloud.ply` and
-    /// `deformation.pth`, or one above it. Makes a run, for `encode` and `eval`.
+    /// `deformation.pth`, or a folder above it. The import makes a run, for `encode` and `eval`.
     #[value(name = "4dgaussians")]
     FourDGaussians,
-    /// A PLY file of 3DGS: Gaussians without motion. Makes a .l4gs file.
+    /// A PLY file of 3DGS: Gaussians without motion. The import makes a .l4gs file.
     Ply,
 }
 
@@ -37,8 +37,8 @@ pub(super) struct Import {
     /// Folder of the new run, or for a PLY the .l4gs file to write.
     #[arg(long)]
     out: PathBuf,
-    /// Folder of the dataset on which the scene was trained. With this option, quantization steps are searched on
-    /// training images; otherwise, on views around the scene.
+    /// Folder of the dataset on which the scene was trained. With this option, the quantization steps are searched on
+    /// training images; without it, on views around the scene.
     #[arg(long)]
     scene: Option<PathBuf>,
     /// A preset or a TOML file that says how the scene is coded. The model itself comes from the source.

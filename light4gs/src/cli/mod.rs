@@ -113,12 +113,13 @@ enum Command {
     /// One task of a study, as its launcher starts it.
     #[command(hide = true)]
     StudyTask(study::StudyTask),
-    /// Write the file of a take from the segments that are finished. So the first half plays while the second is in training.
+    /// Write the file of a take from the segments that are finished. So the first half of a take plays while the second
+    /// half is in training.
     #[command(after_help = "Example:\n  light4gs join runs/walk")]
     Join(take::Join),
-    /// Train what was filmed after the end of a take. Its base and its segments stay as they are.
+    /// Train what was filmed after the end of a take. The base and the segments of the take stay as they are.
     ///
-    /// The same command continues after an interruption.
+    /// After an interruption, the same command continues the training.
     #[command(after_help = "Example:\n  light4gs extend runs/walk data/walk-longer")]
     Extend(take::Extend),
     /// One task of a take, as its launcher starts it.
@@ -127,7 +128,8 @@ enum Command {
     /// Print what differs between runs: program and machine, configuration, results.
     #[command(after_help = "Example:\n  light4gs compare runs/one runs/other")]
     Compare(compare::Compare),
-    /// Print what an issue should say: version, machine, devices, last error. It contains none of your paths or names.
+    /// Print what an issue should say: version, machine, devices, last error. The text contains none of your paths or
+    /// names.
     #[command(after_help = "Example:\n  light4gs report")]
     Report(report::Report),
     /// Time every part of a training step on one or more devices.

@@ -11,7 +11,8 @@ use super::train::{RunOutput, train};
 
 #[derive(Debug, Args)]
 pub(super) struct Quickstart {
-    /// Folder of the run. The dataset is made beside it, in a folder with the same name and the suffix `-scene`.
+    /// Folder of the run. The dataset is made beside this folder, in a folder with the same name and the suffix
+    /// `-scene`.
     #[arg(long, default_value = "runs/quickstart")]
     out: PathBuf,
     /// Back end: ndarray, flex, wgpu, or wgpu with an adapter such as wgpu:0.

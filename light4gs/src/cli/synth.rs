@@ -37,7 +37,7 @@ pub(super) struct Synth {
 /// Options of a take.
 #[derive(Debug, Args)]
 struct Take {
-    /// Number of cameras of a take. A single camera moves; several cameras stand still, and there is one more for
+    /// Number of cameras of a take. A single camera moves; several cameras stand still, and one more camera is for
     /// testing [default: 1].
     #[arg(long, requires = "seconds", allow_negative_numbers = true)]
     cameras: Option<usize>,
@@ -53,7 +53,7 @@ struct Take {
     /// The camera of a take jumps to another place at this second.
     #[arg(long, value_name = "SECONDS", requires = "seconds", allow_negative_numbers = true)]
     cut: Option<f64>,
-    /// The light of a take changes at this second, within half a second.
+    /// The light of a take begins to change at this second, and has changed after half a second.
     #[arg(long, value_name = "SECONDS", requires = "seconds", allow_negative_numbers = true)]
     light: Option<f64>,
 }

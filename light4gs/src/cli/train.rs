@@ -40,20 +40,22 @@ pub(super) struct RunOutput {
     /// Show no progress bars.
     #[arg(long)]
     pub(super) quiet: bool,
-    /// Print the time of every part of a training step. The run becomes slower, since it waits for the device after
-    /// each part.
+    /// Print the time of every part of a training step. The run becomes slower, since the program waits for the device
+    /// after each part of the step.
     #[arg(long)]
     pub(super) profile: bool,
 }
 
 #[derive(Debug, Args)]
 pub(super) struct Train {
-    /// Folder of the dataset, or videos: one of a moving camera, or one for each camera of a rig. Videos are first prepared in
-    /// the folder OUT-prepared (see `light4gs prepare`). An interrupted command continues where it stopped.
+    /// Folder of the dataset, or videos: one video of a moving camera, or one video for each camera of a rig. Videos
+    /// are first prepared in the folder OUT-prepared (see `light4gs prepare`). After an interruption, the same command
+    /// continues where it stopped.
     #[arg(required = true, value_name = "SCENE|VIDEO")]
     scene: Vec<PathBuf>,
-    /// A preset (see docs/configuration.md) or a TOML file. By default the preset of the dataset's layout, such as dnerf, which
-    /// trains control nodes. paper-dnerf+paper-coding trains the paper's hexplane with the paper's protocol.
+    /// A preset (see docs/configuration.md) or a TOML file. The default is the preset with the name of the dataset's
+    /// layout, such as dnerf, which trains control nodes. The preset paper-dnerf+paper-coding trains the paper's
+    /// hexplane with the paper's protocol.
     #[arg(long, value_name = "PRESET|FILE")]
     config: Option<String>,
     /// Layout of the dataset; if this option is not given, the layout is found by content (see docs/data.md).
@@ -73,7 +75,7 @@ pub(super) struct Train {
     wishes: Wishes,
     /// Train a take, for captures of more than about ten seconds. A take has a base that stands still and segments of
     /// about this number of seconds, and plays as one file. With `auto` a segment has two seconds, but at least 45 and
-    /// at most 90 frames. No segment crosses a cut. The same command continues after an interruption.
+    /// at most 90 frames. No segment crosses a cut. After an interruption, the same command continues the training.
     #[arg(long, value_name = "SECONDS|auto", value_parser = segment_length)]
     segment: Option<SegmentLength>,
     #[command(flatten)]

@@ -33,16 +33,17 @@ pub(super) struct Wishes {
     /// number of Gaussians.
     #[arg(long, value_name = "NUMBER", value_parser = clap::value_parser!(u32).range(8..=16_384))]
     pixels: Option<u32>,
-    /// Minutes of training on this machine, approximately. Adapts the number of iterations to the speed of the machine,
-    /// which is measured before the start.
+    /// Minutes of training on this machine, approximately. This option adapts the number of iterations to the speed of
+    /// the machine, which is measured before the start.
     #[arg(long, value_name = "NUMBER", value_parser = minutes)]
     minutes: Option<f64>,
-    /// Upper bound of the file in bytes, such as 300k or 2M; the file comes close to it. Adapts the number of Gaussians
-    /// and the weight of a byte in the loss.
+    /// Upper bound of the file in bytes, such as 300k or 2M; the file comes close to it. This option adapts the number
+    /// of Gaussians, and the weight of a byte in the loss.
     #[arg(long, value_name = "NUMBER", value_parser = bytes)]
     target_bytes: Option<usize>,
-    /// Lower bound of the PSNR of the decoded file on the test views, dB; the file comes close to it. Adapts the weight of a
-    /// byte in the loss in the last part of training. If the run misses the bound, it is kept, and the exit code is 2.
+    /// Lower bound of the PSNR of the decoded file on the test views, dB; the file comes close to it. In the last part
+    /// of training, this option adapts the weight of a byte in the loss. If the run misses the bound, it is kept, and
+    /// the exit code is 2.
     #[arg(long, value_name = "NUMBER", value_parser = decibels, conflicts_with = "target_bytes")]
     target_db: Option<f64>,
 }

@@ -129,7 +129,7 @@ macro_rules! built_in_fields {
 }
 
 built_in_fields! {
-    /// The paper's: multiscale hexplane and network.
+    /// The paper's field: a multiscale hexplane and a network.
     #[serde(flatten)]
     HexPlane = hexplane: HexPlaneField,
     /// Control nodes, which Gaussians follow.

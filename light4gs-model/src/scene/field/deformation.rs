@@ -22,17 +22,17 @@ keys! {
         width: usize = 64; Whole { least: 1, most: 4096 }, "paper, D-NeRF";
         /// Layers before the heads. 0 means the same as 1.
         depth: usize = 1; Whole { least: 0, most: 64 }, "reference";
-        /// Positions move.
+        /// Whether positions move with time.
         position: bool = true; Flag, "reference";
-        /// Scales change.
+        /// Whether scales change with time.
         scale: bool = true; Flag, "reference";
-        /// Rotations change.
+        /// Whether rotations change with time.
         rotation: bool = true; Flag, "reference";
-        /// Opacities change.
+        /// Whether opacities change with time.
         opacity: bool = false; Flag, "reference: off for D-NeRF and HyperNeRF, on for Neu3D";
-        /// Spherical harmonics change.
+        /// Whether spherical harmonics change with time.
         sh: bool = false; Flag, "reference: off for D-NeRF and HyperNeRF, on for Neu3D";
-        /// Positions get a gradient through the hexplane query as well. Off is what the reference does.
+        /// Whether positions get a gradient through the hexplane query as well. In the reference, this is off.
         differentiate_points: bool = true; Flag, "ours";
     }
 }

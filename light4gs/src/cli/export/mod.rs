@@ -46,44 +46,44 @@ pub(super) struct Export {
     /// The .l4gs file, a scene or a take; or the folder of a run or of a take.
     #[arg(value_name = "FILE|RUN")]
     file: PathBuf,
-    /// Folder or file; the suffix of its name chooses the format. A folder (no suffix, a slash at the end, or an
-    /// existing folder) gets `0000.ply`, `0001.ply`, ...; it must not hold numbered PLY files of another sequence. A
-    /// .zip gets the same PLY files, a .ply a single time, a .4dgs the whole motion. A .glb (KHR_gaussian_splatting)
-    /// gets the whole motion of control nodes (skin and animation); for other fields, or with --time, a single time. A
-    /// .ply or .glb of a take gets a single time (--at) or the base alone (--base); --to glb writes a .glb for each
-    /// segment.
+    /// Folder or file; the suffix of its name chooses the format. The output is a folder if its name has no suffix or
+    /// ends in a slash, or if the folder exists already. A folder gets `0000.ply`, `0001.ply`, ...; it must not hold
+    /// numbered PLY files of another sequence. A .zip gets the same PLY files, a .ply gets a single time, and a .4dgs
+    /// gets the whole motion. A .glb (KHR_gaussian_splatting) gets the whole motion of control nodes (skin and
+    /// animation); for other fields, or with --time, a .glb gets a single time. A .ply or .glb of a take gets a single
+    /// time (--at) or the base alone (--base). With --to glb, each segment of a take gets a .glb.
     #[arg(long, required_unless_present_any = ["html", "site"])]
     out: Option<PathBuf>,
-    /// Files of the folder. ply: a file for each frame. glb (for takes only): a file for each segment, with the
-    /// segment's motion and what stands still around it; `base.glb`, with what stands still over the whole take; and
-    /// `segments.json`, with the times of each segment.
+    /// Kind of the files in the folder. With ply, there is a file for each frame. With glb, for takes only, there is a
+    /// file for each segment, with the segment's motion and what stands still around it. With glb there are also
+    /// `base.glb`, with what stands still over the whole take, and `segments.json`, with the times of each segment.
     #[arg(long, value_enum, value_name = "KIND", default_value = "ply")]
     to: FolderOf,
     /// A single time of a take in seconds, for a .ply or .glb file.
     #[arg(long, value_name = "SECONDS", allow_negative_numbers = true, conflicts_with_all = ["frames", "fps", "time"])]
     at: Option<f64>,
-    /// Write only what stands still over the whole take, for a .ply or .glb file. For this, the first bytes of the
-    /// take's file are enough, which hold its index and its base.
+    /// Write only what stands still over the whole take, for a .ply or .glb file. The first bytes of the take's file
+    /// are enough for this, since they hold its index and its base.
     #[arg(long, conflicts_with_all = ["frames", "fps", "time", "at"])]
     base: bool,
     /// A page that plays the scene in a browser without any other file.
     #[arg(long, value_name = "FILE", conflicts_with_all = ["out", "frames", "device", "time", "fps", "z_up", "limits", "at", "base"])]
     html: Option<PathBuf>,
-    /// A folder that any static server shows: the page `index.html`, the player, the file, cameras, and a picture for previews of
-    /// its link.
+    /// A folder that any static server shows: the page `index.html`, the player, the file, cameras, and a picture for
+    /// previews of the page's link.
     #[arg(long, value_name = "DIR", conflicts_with_all = ["html", "out", "frames", "device", "time", "fps", "z_up", "limits", "at", "base"])]
     site: Option<PathBuf>,
     /// The address at which the folder of --site will be. Previews of links need this address.
     #[arg(long, value_name = "ADDRESS", requires = "site")]
     url: Option<String>,
-    /// The title of the page, and of previews of its link; by default the name stored in the file.
+    /// The title of the page, and of previews of the page's link; by default the name stored in the file.
     #[arg(long, value_name = "TEXT", conflicts_with = "out")]
     title: Option<String>,
     /// Dataset whose cameras the page offers; by default the dataset of the run whose folder holds the file.
     #[arg(long, conflicts_with = "out")]
     scene: Option<PathBuf>,
-    /// Number of frames from time 0 to time 1; in a .glb, number of keyframes. By default as many as the file was made
-    /// from.
+    /// Number of frames from time 0 to time 1; in a .glb, number of keyframes. By default, as many frames as the file
+    /// was made from.
     #[arg(long, value_parser = clap::value_parser!(u32).range(1..=i64::from(MOST_FRAMES)), allow_negative_numbers = true)]
     frames: Option<u32>,
     /// A single time, in [0, 1], for a .ply or .glb file. An output that can hold only one time gets time 0 by default.

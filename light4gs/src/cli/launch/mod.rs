@@ -21,7 +21,7 @@ const PAUSE: Duration = Duration::from_millis(500);
 pub(super) enum Launcher {
     /// Processes on this machine.
     Local,
-    /// A job array on a Slurm cluster; the command returns when it is submitted.
+    /// A job array on a Slurm cluster; the command returns when the job array is submitted.
     Slurm,
 }
 

@@ -50,8 +50,9 @@ pub(super) struct Study {
     /// the file is written share one training.
     #[arg(long)]
     out: Option<PathBuf>,
-    /// The preset or TOML file that variants start from, in place of the study's own or of hexplane-dnerf-cpu; {scene} in
-    /// this name stands for the scene's name. A value that names its own keeps it.
+    /// The preset or TOML file that variants start from, in place of the study's own or of hexplane-dnerf-cpu; {scene}
+    /// in this name stands for the scene's name. If a value of an axis of the study names a preset of its own, the
+    /// value keeps that preset.
     #[arg(long, value_name = "PRESET|FILE")]
     config: Option<String>,
     /// Factor by which the length of every variant's schedule is multiplied, such as 0.25 for a first look.
@@ -64,17 +65,17 @@ pub(super) struct Study {
     /// such as wgpu:0.
     #[arg(long)]
     device: Option<DeviceName>,
-    /// Number of runs of each variant on each scene, each with a seed of its own. Tables then show means and standard
-    /// deviations.
+    /// Number of runs of each variant on each scene, each with a seed of its own. With several seeds, tables show means
+    /// and standard deviations.
     #[arg(long, default_value_t = 1, value_parser = clap::value_parser!(u64).range(1..=1000))]
     seeds: u64,
-    /// Folder of another study. If one of its finished runs trained just as a run of this study would, its training is
-    /// reused, not repeated. May be given more than once.
+    /// Folder of another study. If a finished run of that study trained just as a run of this study would, this
+    /// training is reused, not repeated. This option may be given more than once.
     #[arg(long, value_name = "STUDY")]
     reuse: Vec<PathBuf>,
     /// Train only the runs that have these parts, such as 400,small,seed-0, in their names SCENE/VALUE+VALUE/seed-K. If
-    /// several scenes, several values of one axis or several seeds are given, a run needs only one of them. The other
-    /// runs stay missing.
+    /// several scenes are given, a run needs only one of them; the same holds for several values of one axis and for
+    /// several seeds. Runs without the parts stay missing.
     #[arg(long, value_delimiter = ',', value_name = "PART")]
     only: Vec<String>,
     /// Print the runs, without training.

@@ -131,7 +131,8 @@ fn join(folder: &TakeFolder) -> Result<(), TrainError> {
 pub(super) struct Extend {
     /// Folder of a trained take.
     run: PathBuf,
-    /// Folder of a dataset that has more frames after those of the take. It may be the take's own dataset, with new frames.
+    /// Folder of a dataset that has more frames after those of the take. The dataset may be the take's own, with new
+    /// frames.
     scene: PathBuf,
     #[command(flatten)]
     launch: LaunchOptions,

@@ -77,10 +77,11 @@ keys! {
         opacity: f64 = 0.15; Number { least: 1e-4, most: 0.999 }, "ours";
         /// Every Gaussian learns a stillness: its skinning logit for an additional node that never moves.
         stillness: bool = true; Flag, "ours";
-        /// Stillness at the beginning. For comparison: a Gaussian at a node's anchor has a logit of 0 for that node.
+        /// Stillness at the beginning. For comparison: a Gaussian at a node's anchor has a skinning logit of 0 for that
+        /// node.
         stillness_start: f64 = -4.0; Number { least: -30.0, most: 30.0 }, "ours";
-        /// Every Gaussian learns a lifetime, a bell curve over time by which its opacity is multiplied. This begins
-        /// with the iteration at which the sampler's window holds all times.
+        /// Every Gaussian learns a lifetime, a bell curve over time by which its opacity is multiplied. Lifetimes begin
+        /// with the iteration at which the sampler's window of time holds all times.
         lifetime: bool = false; Flag, "ours";
         /// Length of the affinities, which are learned vectors of Gaussians and of nodes. The inner product of a
         /// Gaussian's and a node's affinity is added to the logit of the skinning weight. So a foot and the floor under
@@ -90,12 +91,12 @@ keys! {
         rigidity: f64 = 1.0; WEIGHT, "ours; SC-GS: 1e-4 to 0";
         /// Weight of the squared second differences of trajectories.
         smoothness: f64 = 0.1; WEIGHT, "ours";
-        /// Learning rate of translations, as a multiple of the deformation's rate. Translations are in shares of the
-        /// scene's extent.
+        /// Learning rate of the nodes' translations as a multiple of the deformation's learning rate. Translations are
+        /// in shares of the scene's extent.
         translation_rate: f64 = 2.0; FACTOR, "ours";
-        /// Learning rate of rotations as a multiple of the deformation's rate.
+        /// Learning rate of the nodes' rotations as a multiple of the deformation's learning rate.
         rotation_rate: f64 = 8.0; FACTOR, "ours";
-        /// Learning rate of the nodes' places and radii as a multiple of the deformation's rate.
+        /// Learning rate of the nodes' anchors and radii as a multiple of the deformation's learning rate.
         anchor_rate: f64 = 5.0; FACTOR, "ours";
     }
 }
