@@ -132,7 +132,8 @@ fn plain(case: &Case, values: Tensor<2>, parameters: Tensor<2>) -> Tensor<2> {
     let [lower, upper] = [-half, half].map(|side| density.logits(values.clone() + side));
     // On the side where the logistic function is small.
     let side = (lower.clone() + upper.clone()).detach().greater_elem(0.0).float() * -2.0 + 1.0;
-    let sigmoid = |logit: Tensor<2>| ((logit * side.clone()).neg().exp() + 1.0).recip();
+    // Clamped, or the gradient of a logistic function far below zero would be infinity times 0.
+    let sigmoid = |logit: Tensor<2>| ((logit * side.clone()).clamp_min(-60.0).neg().exp() + 1.0).recip();
     (sigmoid(upper) - sigmoid(lower)).abs()
 }
 
