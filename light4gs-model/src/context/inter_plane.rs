@@ -10,6 +10,7 @@ use light4gs_codec::{Network, PlaneSource};
 use super::prior::{CenteredPlanes, DescribedCondition, DescribedPrior, Passes, Prior, PriorPart};
 use crate::entropy::bottleneck::Latent;
 use crate::entropy::convolution::{PlaneConv, PlaneConvConfig};
+use crate::ops::time_means::time_means;
 
 /// Configuration of an [`InterPlane`].
 #[derive(Config, Debug)]
@@ -55,10 +56,7 @@ impl InterPlane {
     /// assert_eq!(InterPlane::context(xt, yt).dims(), [32, 12, 8]);
     /// ```
     pub fn context(over_a: Tensor<3>, over_b: Tensor<3>) -> Tensor<3> {
-        let ([channels, _, a], [_, _, b]) = (over_a.dims(), over_b.dims());
-        let along_a = over_a.mean_dim(1).expand([channels, b, a]);
-        let along_b = over_b.mean_dim(1).reshape([channels, b, 1]).expand([channels, b, a]);
-        Tensor::cat(vec![along_a, along_b], 0)
+        time_means(over_a, over_b)
     }
 
     /// The same computation as [`Self::forward`], for the codec's exact executor.

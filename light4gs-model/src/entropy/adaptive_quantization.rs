@@ -81,8 +81,15 @@ impl AdaptiveQuantization {
     /// [`QUANTIZATION_STEP`] allows to the coarsest that it does.
     pub fn no_finer_than(&mut self, config: &AdaptiveQuantizationConfig) {
         let log_steps = self.log_steps.val().inner();
-        let initial = config.log_steps(&log_steps.device());
-        let value = Tensor::from_inner(log_steps.max_pair(initial).clamp_max(COARSEST.ln()));
+        let coarsest = COARSEST.ln();
+        let bounded = if config.space_only == config.space_time {
+            // One launch on a GPU.
+            log_steps.clamp(config.space_only.ln(), coarsest)
+        } else {
+            let initial = config.log_steps(&log_steps.device());
+            log_steps.max_pair(initial).clamp_max(coarsest)
+        };
+        let value = Tensor::from_inner(bounded);
         let learns = self.log_steps.is_require_grad();
         self.log_steps = Param::initialized(self.log_steps.id, value.set_require_grad(learns));
     }

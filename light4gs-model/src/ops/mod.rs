@@ -43,6 +43,7 @@ pub mod skinning;
 pub mod splat;
 pub mod sums;
 pub mod tensor_list;
+pub mod time_means;
 pub mod uniform_noise;
 
 use std::fmt::Debug;
@@ -84,6 +85,7 @@ pub const ON_GPU: &[GpuOperation] = &[
     skinning::gpu::OPERATION,
     splat::gpu::OPERATION,
     sums::gpu::OPERATION,
+    time_means::gpu::OPERATION,
     uniform_noise::gpu::OPERATION,
 ];
 

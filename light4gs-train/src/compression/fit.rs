@@ -54,7 +54,8 @@ pub fn fit<F: DeformationField, E: EntropyModels>(
         );
         let rate = compression.rate(&noisy, settings.rate.fraction, true, None, &mut random);
         let mut gradients = GradientSums::default();
-        gradients.add_module(&compression, &mut rate.megabytes().backward());
+        let Some(rate) = rate.megabytes() else { break };
+        gradients.add_module(&compression, &mut rate.backward());
         // The steps do not change: there is no distortion here against which their rate could be weighed.
         adam.step_modules(&mut [(COMPRESSION, &mut compression)], &mut gradients, |group, _| match group {
             ParameterGroup::Context => Some(context.at(iteration as f64)),

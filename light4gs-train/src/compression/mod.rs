@@ -40,7 +40,8 @@ pub use encoder::{
 pub use fit::fit;
 pub use models::{ConfiguredModels, EntropyModels, ShModel};
 pub use quality::{mean_psnr, measured_views, splatter_of};
-pub use rate::{NoisyScene, Rate};
+pub(crate) use rate::BITS_A_MEGABYTE;
+pub use rate::{Estimate, NoisyScene, Rate};
 pub use step_factor::MissedQuality;
 
 use burn::module::Module;

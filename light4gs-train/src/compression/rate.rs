@@ -25,45 +25,66 @@ pub struct NoisyScene<F: DeformationField = BuiltInField> {
 }
 
 /// Bits of 10^6 bytes.
-const BITS_A_MEGABYTE: f64 = 8e6;
+pub(crate) const BITS_A_MEGABYTE: f64 = 8e6;
+
+/// Estimated bits of a part of a file, from a share of its numbers.
+#[derive(Clone, Debug)]
+pub struct Estimate {
+    /// `[1]`: of the share.
+    bits: Tensor<1>,
+    /// All numbers, divided by those of the share.
+    scale: f64,
+    /// All numbers.
+    symbols: usize,
+}
+
+impl Estimate {
+    /// `[1]`: of all numbers.
+    pub fn bits(self) -> Tensor<1> {
+        self.weighted(1.0)
+    }
+
+    /// All numbers.
+    pub fn symbols(&self) -> usize {
+        self.symbols
+    }
+
+    /// `[1]`: the bits of all numbers, times a weight. The factors are multiplied first: on a GPU each is a launch.
+    pub fn weighted(self, weight: f64) -> Tensor<1> {
+        self.bits * (self.scale * weight)
+    }
+}
 
 /// Estimated bits of a file's planes, spherical harmonics and other attributes.
 #[derive(Clone, Debug)]
 pub struct Rate {
-    /// `[1]`: of all planes, latents included; 0 for frozen planes.
-    pub planes: Tensor<1>,
-    /// Values of all planes.
-    pub plane_symbols: usize,
-    /// `[1]`: of all spherical harmonics beyond degree 0, if they are in the rate.
-    pub sh: Option<Tensor<1>>,
-    /// Number of those values.
-    pub sh_symbols: usize,
+    /// Of all planes, latents included, if there are planes that are not frozen.
+    pub planes: Option<Estimate>,
+    /// Of all spherical harmonics beyond degree 0, if they have a model of their own and are in the rate.
+    pub sh: Option<Estimate>,
     /// `[1]`: of the other attributes of the Gaussians, if they are in the rate.
     pub attributes: Option<Tensor<1>>,
 }
 
 impl Rate {
-    /// `[1]`: megabytes (10^6) of planes and spherical harmonics in the file.
-    pub fn megabytes(self) -> Tensor<1> {
-        let bits = match self.sh {
-            Some(sh) => self.planes + sh,
-            None => self.planes,
-        };
-        bits / BITS_A_MEGABYTE
+    /// `[1]`: the bits of planes and spherical harmonics, each times its weight; `None` if neither is in the rate.
+    pub fn weighted(self, weight: impl Fn(&Estimate) -> f64) -> Option<Tensor<1>> {
+        let parts = [self.planes, self.sh].into_iter().flatten();
+        let weighted = parts.map(|part| {
+            let weight = weight(&part);
+            part.weighted(weight)
+        });
+        weighted.reduce(|sum, part| sum + part)
+    }
+
+    /// `[1]`: megabytes (10^6) of planes and spherical harmonics in the file; `None` if neither is in the rate.
+    pub fn megabytes(self) -> Option<Tensor<1>> {
+        self.weighted(|_| 1.0 / BITS_A_MEGABYTE)
     }
 
     /// `[1]`: megabytes of the other attributes, if they are in the rate.
     pub fn attribute_megabytes(&self) -> Option<Tensor<1>> {
         self.attributes.clone().map(|bits| bits / BITS_A_MEGABYTE)
-    }
-
-    /// `[1]`: bits per plane symbol plus bits per symbol of the spherical harmonics, as the paper weights them.
-    pub fn bits_per_symbol(self) -> Tensor<1> {
-        let planes = self.planes / self.plane_symbols.max(1) as f64;
-        match self.sh {
-            Some(sh) if self.sh_symbols > 0 => planes + sh / self.sh_symbols as f64,
-            _ => planes,
-        }
     }
 }
 
@@ -141,9 +162,9 @@ impl<C: PlaneEntropy, S: ShModel> Compression<C, S> {
             let share = planes.len() as f64 / chosen.len() as f64;
             let bits = models.context.rate(planes, steps, &chosen, Latent::Noise);
             let bits = bits.into_iter().map(|rate| rate.total()).reduce(|sum, plane| sum + plane);
-            bits.expect("at least one plane is chosen") * share
+            let symbols = planes.iter().map(|plane| plane.dims().iter().product::<usize>()).sum();
+            Estimate { bits: bits.expect("at least one plane is chosen"), scale: share, symbols }
         });
-        let plane_bits = plane_bits.unwrap_or_else(|| Tensor::zeros([1], &sh_rest.device()));
 
         let [count, coefficients, colors] = sh_rest.dims();
         let mut rows = |count: usize| -> Vec<u32> {
@@ -152,7 +173,7 @@ impl<C: PlaneEntropy, S: ShModel> Compression<C, S> {
         let sh = self.sh.as_ref().filter(|_| with_gaussians && count > 0).map(|sh| {
             let rows = rows(count);
             let share = count as f64 / rows.len() as f64;
-            let count = rows.len();
+            let (all, count) = (count, rows.len());
             let rows: Vec<i64> = rows.into_iter().map(i64::from).collect();
             let rows = Tensor::<1, Int>::from_data(TensorData::new(rows, [count]), &sh_rest.device());
             let known = match sh.tables() {
@@ -160,16 +181,16 @@ impl<C: PlaneEntropy, S: ShModel> Compression<C, S> {
                 Some(_) => ShKnown::nothing(&rows.device()),
                 None => known(scene, planes, Some(rows.clone())),
             };
-            sh.bits(sh_rest.clone().select(0, rows), &known).sum() * share
+            let bits = sh.bits(sh_rest.clone().select(0, rows), &known).sum();
+            Estimate { bits, scale: share, symbols: all * coefficients * colors }
         });
-        let plane_symbols = planes.iter().map(|plane| plane.dims().iter().product::<usize>()).sum();
         let attributes = self.attributes.as_ref().filter(|_| with_gaussians && count > 0);
         let attributes = attributes.map(|model| {
             let gaussians = scene.gaussians.tensors();
             let places = places.unwrap_or_else(|| model.places(gaussians.means.clone()));
             model.bits(gaussians, &places, &rows(count))
         });
-        Rate { planes: plane_bits, plane_symbols, sh, sh_symbols: count * coefficients * colors, attributes }
+        Rate { planes: plane_bits, sh, attributes }
     }
 }
 

@@ -12,7 +12,7 @@ use rand::Rng;
 
 use super::Trainer;
 use super::background::Pending;
-use crate::compression::{Compression, EntropyModels, NoisyScene, freeze_planes};
+use crate::compression::{BITS_A_MEGABYTE, Compression, EntropyModels, NoisyScene, freeze_planes};
 use crate::config::{Config, RateWeighting};
 use crate::error::TrainError;
 use crate::optimization::gradients::GradientSums;
@@ -114,15 +114,19 @@ impl<F: DeformationField, E: EntropyModels> Trainer<F, E> {
         let (noisy_or_apart, places) = (apart.as_ref().unwrap_or(noisy), places.map(Pending::wait));
         let rate = compression.rate(noisy_or_apart, config.fraction, with_gaussians, places, &mut generator);
         let interval = config.interval as f64;
-        let attributes = rate.attribute_megabytes().map(|rate| rate * (config.attribute_lambda * interval));
-        let term = match config.weighting {
-            RateWeighting::PerSymbol => rate.bits_per_symbol() * config.lambda,
-            // Computed once in `interval` iterations and multiplied by that number, so that lambda does not depend
-            // on the interval.
-            RateWeighting::Megabytes => rate.megabytes() * (config.lambda * interval),
-        };
-        let term = attributes.into_iter().fold(term, |sum, part| sum + part);
-        let term = term * self.state.rate_weight;
+        let rate_weight = self.state.rate_weight;
+        let attributes = rate.attribute_megabytes();
+        let attributes = attributes.map(|rate| rate * (config.attribute_lambda * interval) * rate_weight);
+        let modeled = rate.weighted(|part| {
+            let weight = match config.weighting {
+                RateWeighting::PerSymbol => config.lambda / part.symbols().max(1) as f64,
+                // Computed once in `interval` iterations and multiplied by that number, so that lambda does not depend
+                // on the interval.
+                RateWeighting::Megabytes => config.lambda * interval / BITS_A_MEGABYTE,
+            };
+            weight * rate_weight
+        });
+        let term = modeled.into_iter().chain(attributes).reduce(|sum, part| sum + part)?;
         let value = term.clone().inner();
         let mut tape = term.backward();
         let steps = noisy.learned_steps().and_then(|steps| steps.steps().grad(&tape));

@@ -120,7 +120,8 @@ fn the_rate_on_a_part_is_unbiased() {
         device.seed(1);
         let mut generator = ChaCha8Rng::seed_from_u64(seed);
         let rate = compression.rate(&noisy, fraction, true, None, &mut generator);
-        (rate.planes.into_scalar::<f64>(), rate.sh.unwrap().into_scalar::<f64>())
+        let [planes, sh] = [rate.planes, rate.sh].map(|part| part.unwrap().bits().into_scalar::<f64>());
+        (planes, sh)
     };
     let (planes, sh) = estimate(1.0, 0);
     const DRAWS: u64 = 400;

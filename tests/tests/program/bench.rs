@@ -68,11 +68,11 @@ fn a_step_does_not_launch_more_kernels_than_before() {
         ("skinning forward + backward", 11),
         ("nodes, training step", 45),
         ("nodes, step with noise", 51),
-        ("nodes, step with noise and rate", 123),
+        ("nodes, step with noise and rate", 119),
         ("nodes, render", 20),
         ("hexplane, training step", 85),
-        ("hexplane, step with noise", 104),
-        ("hexplane, step with noise and rate", 241),
+        ("hexplane, step with noise", 101),
+        ("hexplane, step with noise and rate", 220),
     ] {
         let found = launches(part);
         assert!((1..=bound + more).contains(&found), "{part}: {found} launches, {bound} before; {adapter}");
