@@ -198,6 +198,26 @@ test("no more than four segments are decoded, wherever the time goes", async () 
   await page.context().close();
 });
 
+test("an image waits again where its segment was forgotten meanwhile", async () => {
+  serveTake(long, { step: Infinity });
+  const page = await takePage();
+  const colors = await page.evaluate(async (view) => {
+    const take = await globalThis.load();
+    await globalThis.play(take);
+    const colors = [await globalThis.colorAt(21.5, view)];
+    const { ready } = take;
+    take.ready = async (share) => {
+      take.ready = ready;
+      await take.ready(share);
+      take.segments.decoded.delete(0);
+    };
+    colors.push(await globalThis.colorAt(0.5, view));
+    return colors;
+  }, view);
+  assert.deepEqual(colors, ["yellow", "red"]);
+  await page.context().close();
+});
+
 test("where no segment is, the base is shown alone", async () => {
   serveTake(take, { step: Infinity });
   const page = await takePage();
