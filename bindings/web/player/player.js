@@ -484,13 +484,13 @@ export class Player extends EventTarget {
     this.pause();
     this.following = false;
     await this.ready;
-    this.time = time;
     // While an image of an earlier time is on its way, the segment of this time may be forgotten again.
     do {
       await this.scene.ready(time);
       while (this.#busy) await new Promise((resolve) => setTimeout(resolve, 1));
     } while (this.scene.waitsAt(time));
     this.camera.take(view);
+    this.time = time;
     await this.#show();
     this.renderer.draw(view, this.background);
     this.#dirty = this.#undrawn = this.#wasDraft = false;
