@@ -35,6 +35,11 @@ fn edges_of(offset: f32, scale: f32) -> vec2<f32> {
     return (vec2<f32>(0.5, -0.5) - abs(offset)) / scale;
 }
 
+// At least the bound; NaN stays NaN, which `max` may hide.
+fn raised(value: f32, bound: f32) -> f32 {
+    return select(value, bound, value < bound);
+}
+
 fn mass_between(edges: vec2<f32>) -> f32 {
     return normal_distribution(edges.x) - normal_distribution(edges.y);
 }

@@ -30,7 +30,7 @@ fn main(
         return;
     }
     let offset = values[i] - parameters[bounds.count + i];
-    let edges = edges_of(offset, max(parameters[i], bounds.scale));
-    let likelihood = max(mass_between(edges), bounds.likelihood);
+    let edges = edges_of(offset, raised(parameters[i], bounds.scale));
+    let likelihood = raised(mass_between(edges), bounds.likelihood);
     measured[i] = select(likelihood, -log2(likelihood), bounds.in_bits != 0u);
 }

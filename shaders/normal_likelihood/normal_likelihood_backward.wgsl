@@ -37,10 +37,10 @@ fn main(
         return;
     }
     let offset = values[i] - parameters[bounds.count + i];
-    let scale = max(parameters[i], bounds.scale);
+    let scale = raised(parameters[i], bounds.scale);
     let edges = edges_of(offset, scale);
     let likelihood = mass_between(edges);
-    let by_bits = -1.44269504 / max(likelihood, bounds.likelihood);
+    let by_bits = -1.44269504 / raised(likelihood, bounds.likelihood);
     let of_likelihood = upstream[i] * select(1.0, by_bits, bounds.in_bits != 0u);
     let gradient = through_bound(likelihood, bounds.likelihood, of_likelihood);
     let upper = normal_density(edges.x);

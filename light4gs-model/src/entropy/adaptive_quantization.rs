@@ -7,6 +7,7 @@ use light4gs_keys::{Bounds, keys};
 
 use super::quantization_steps::{PlaneSteps, QUANTIZATION_STEP};
 
+/// The coarsest step that the encoder takes.
 const COARSEST: f64 = match QUANTIZATION_STEP {
     Bounds::Number { most, .. } => most,
     _ => panic!("the bounds of a number"),

@@ -145,7 +145,8 @@ impl<C: PlaneEntropy, S: ShModel> Compression<C, S> {
         self.attributes.as_ref().filter(|attributes| attributes.is_started())
     }
 
-    /// Keeps learned steps from becoming finer than a configuration begins with: finer ones help training frames only.
+    /// Keeps learned steps from becoming finer than a configuration begins with, as finer ones help training frames only, and coarser
+    /// than the encoder takes.
     pub fn bound_steps(&mut self, config: &Config) {
         if let Some(models) = &mut self.planes {
             models.quantization.no_finer_than(&config.compression.steps.initial);

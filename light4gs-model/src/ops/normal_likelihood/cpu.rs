@@ -59,7 +59,7 @@ struct Interval {
 impl Interval {
     fn new([value, mean, scale]: [f32; 3], bounds: NormalBounds) -> Self {
         let distance = -(value - mean).abs();
-        let scale = scale.max(bounds.scale);
+        let scale = raised(scale, bounds.scale);
         Self { edges: [(distance + 0.5) / scale, (distance - 0.5) / scale], scale }
     }
 
@@ -77,6 +77,11 @@ impl Interval {
     }
 }
 
+/// At least the bound; NaN stays NaN, so that a training that has diverged is found.
+fn raised(value: f32, bound: f32) -> f32 {
+    if value < bound { bound } else { value }
+}
+
 /// The gradient through a lower bound: see [`lower_bound`](crate::ops::lower_bound::lower_bound).
 fn through_bound(value: f32, bound: f32, gradient: f32) -> f32 {
     if value < bound && gradient >= 0.0 { 0.0 } else { gradient }
@@ -91,7 +96,7 @@ fn forward<B: HostBackend>(tensors: NormalTensors<B>, bounds: NormalBounds, meas
     measured.par_chunks_mut(CHUNK).enumerate().for_each(|(chunk, measured)| {
         for (i, measured) in (chunk * CHUNK..).zip(measured) {
             let likelihood = Interval::new([values[i], means[i], scales[i]], bounds).likelihood();
-            let likelihood = likelihood.max(bounds.likelihood);
+            let likelihood = raised(likelihood, bounds.likelihood);
             *measured = match measure {
                 Measure::Likelihood => likelihood,
                 Measure::Bits => -likelihood.log2(),
@@ -124,7 +129,7 @@ fn backward<B: HostBackend>(
             let likelihood = interval.likelihood();
             let of_likelihood = match measure {
                 Measure::Likelihood => upstream[i],
-                Measure::Bits => -LOG2_E * upstream[i] / likelihood.max(bounds.likelihood),
+                Measure::Bits => -LOG2_E * upstream[i] / raised(likelihood, bounds.likelihood),
             };
             let gradient = through_bound(likelihood, bounds.likelihood, of_likelihood);
             let [by_distance, by_scale] = interval.derivatives();

@@ -118,7 +118,7 @@ impl Sizes {
 }
 
 fn forward<B: HostBackend>(tensors: ConvolutionTensors<B>, convolution: PlaneConvolution) -> FloatTensor<B> {
-    let sizes = Sizes::of(&tensors, convolution);
+    let sizes = Sizes::of::<B>(&tensors.plane, &tensors.weight, convolution);
     let ConvolutionTensors { plane, weight, bias } = tensors;
     let matrix = sizes.matrix::<B>(weight);
     let output = if convolution.transposed {
@@ -141,8 +141,7 @@ fn forward<B: HostBackend>(tensors: ConvolutionTensors<B>, convolution: PlaneCon
 
 fn backward<B: HostBackend>(saved: Convolved<B>, gradient: FloatTensor<B>) -> ConvolutionTensors<B> {
     let Convolved { plane, weight, output, convolution } = saved;
-    let bias = gradient.clone();
-    let sizes = Sizes::of(&ConvolutionTensors::<B> { plane: plane.clone(), weight: weight.clone(), bias }, convolution);
+    let sizes = Sizes::of::<B>(&plane, &weight, convolution);
     let [channels, height, width] = sizes.output(convolution.transposed);
     let mut gradient = B::to_host(gradient);
     if convolution.slope != 1.0 {

@@ -64,7 +64,7 @@ impl Sizes {
 
 fn forward(tensors: ConvolutionTensors<CubeBackend>, convolution: PlaneConvolution) -> Result<CubeTensor, GpuError> {
     let gpu = Gpu::of(&tensors.plane)?;
-    let sizes = Sizes::of(&tensors, convolution);
+    let sizes = Sizes::of::<CubeBackend>(&tensors.plane, &tensors.weight, convolution);
     let [plane, weight, bias] = [tensors.plane, tensors.weight, tensors.bias].map(buffer_of);
     sizes.convolved(&gpu, [&plane, &weight], Beside::Bias(&bias, convolution.slope), convolution.transposed)
 }
@@ -74,9 +74,7 @@ fn backward(saved: Convolved<CubeBackend>, gradient: CubeTensor) -> Result<Convo
     let Convolved { plane, weight, output, convolution } = saved;
     let PlaneConvolution { slope, transposed, .. } = convolution;
     let weight_shape = weight.shape();
-    let tensors = ConvolutionTensors::<CubeBackend> { plane, weight, bias: gradient };
-    let sizes = Sizes::of(&tensors, convolution);
-    let ConvolutionTensors { plane, weight, bias: gradient } = tensors;
+    let sizes = Sizes::of::<CubeBackend>(&plane, &weight, convolution);
     let [plane, weight, gradient, output] = [plane, weight, gradient, output].map(buffer_of);
     let of_plane = sizes.convolved(&gpu, [&gradient, &weight], Beside::Output(&output, slope), !transposed)?;
 

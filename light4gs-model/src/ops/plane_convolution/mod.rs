@@ -66,8 +66,8 @@ impl Sizes {
         Self { large, small, kernel: weight[2], stride, groups, checkerboard }
     }
 
-    fn of<B: Backend>(tensors: &ConvolutionTensors<B>, convolution: PlaneConvolution) -> Self {
-        let (plane, weight) = (tensors.plane.shape(), tensors.weight.shape());
+    fn of<B: Backend>(plane: &FloatTensor<B>, weight: &FloatTensor<B>, convolution: PlaneConvolution) -> Self {
+        let (plane, weight) = (plane.shape(), weight.shape());
         Self::new([0, 1, 2].map(|axis| plane[axis]), [0, 1, 2, 3].map(|axis| weight[axis]), convolution)
     }
 
