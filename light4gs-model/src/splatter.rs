@@ -153,7 +153,8 @@ impl Splatter {
             Some(backdrop) => backdrop.behind(own, screen_offsets, sh_degree),
             None => (own, screen_offsets, sh_degree),
         };
-        let view = SplatView { room: self.room, ..SplatView::new(*camera, self.background, sh_degree) };
+        let trained = self.backdrop.is_some().then_some(count);
+        let view = SplatView { room: self.room, trained, ..SplatView::new(*camera, self.background, sh_degree) };
         let inputs = SplatInputs {
             means: gaussians.means.into_dispatch(),
             quats: gaussians.quats.into_dispatch(),

@@ -1,8 +1,10 @@
 //! Where the images of a segment differ from the base behind it.
 
+use std::sync::Arc;
+
 use burn::tensor::{Device, Tensor};
 use light4gs_codec::GaussianArrays;
-use light4gs_data::{Frame, Scene};
+use light4gs_data::{Frame, RgbImage8, Scene};
 use light4gs_model::{GaussianTensors, Gaussians, Splatter};
 
 use crate::dataset::ImageSource;
@@ -21,8 +23,8 @@ pub(super) struct Residual<'a> {
     pub(super) error: Vec<f32>,
     /// `[H W]`: depth of the base, world units; infinite where there is none.
     pub(super) depth: Vec<f32>,
-    /// `[H W 3]`: the image.
-    pub(super) truth: Vec<f32>,
+    /// The image.
+    pub(super) truth: Arc<RgbImage8>,
 }
 
 /// The views of a segment by which its base is judged: all cameras at some times of a rig, and some times of one camera.
@@ -60,14 +62,14 @@ fn residual<'a>(
     device: &Device,
 ) -> Result<Residual<'a>, TrainError> {
     let rendering = splatter.render(gaussians.clone(), &frame.camera, None);
-    let truth = image_tensor(&*images.image(frame)?, device);
-    let mut error = (rendering.image - truth.clone()).abs().mean_dim(2).squeeze_dim::<2>(2);
+    let truth = images.image(frame)?;
+    let mut error = (rendering.image - image_tensor(&truth, device)).abs().mean_dim(2).squeeze_dim::<2>(2);
     if let Some(mask) = images.trained_pixels(frame)? {
         error = error * mask_tensor(&mask, device);
     }
     let [alpha, depth] = [rendering.alpha, rendering.depth].map(numbers);
     let depth = alpha.iter().zip(depth).map(|(alpha, depth)| if *alpha > 0.5 { depth / alpha } else { f32::INFINITY });
-    Ok(Residual { frame, error: numbers(error), depth: depth.collect(), truth: numbers(truth) })
+    Ok(Residual { frame, error: numbers(error), depth: depth.collect(), truth })
 }
 
 fn numbers<const D: usize>(tensor: Tensor<D>) -> Vec<f32> {

@@ -61,9 +61,12 @@ impl Start {
         let before = residuals(base.gaussians(), &frames, data.background, images, device)?;
         let hidden = hidden(base.gaussians(), &before, device);
         let shown = base.without(&hidden)?;
-        let residuals = match hidden.is_empty() {
-            true => before,
-            false => residuals(&shown, &frames, data.background, images, device)?,
+        let residuals = if hidden.is_empty() {
+            before
+        } else {
+            // They are large.
+            drop(before);
+            residuals(&shown, &frames, data.background, images, device)?
         };
         Ok(Self { hidden, points: points(&residuals, data, count.max(LEAST), seed) })
     }
@@ -77,12 +80,12 @@ struct Candidate {
 }
 
 fn points(residuals: &[Residual<'_>], data: &Scene, count: usize, seed: u64) -> PointCloud {
-    let differing: Vec<(usize, usize)> = residuals
+    let differing: Vec<[u32; 2]> = residuals
         .iter()
         .enumerate()
         .flat_map(|(view, residual)| {
             let pixels = residual.error.iter().enumerate().filter(|(_, error)| **error >= DIFFERS);
-            pixels.map(move |(pixel, _)| (view, pixel))
+            pixels.map(move |(pixel, _)| [view as u32, pixel as u32])
         })
         .collect();
     let mut random = generator(seed, Purpose::GuidedSampling, Stage::Coarse, 0);
@@ -92,7 +95,7 @@ fn points(residuals: &[Residual<'_>], data: &Scene, count: usize, seed: u64) -> 
     let count = count.min(differing.len() / (PIXELS_A_POINT * residuals.len().max(1))).max(LEAST);
     let draws = if differing.is_empty() { 0 } else { DRAWN * count };
     for _ in 0..draws {
-        let (view, pixel) = differing[random.random_range(0..differing.len())];
+        let [view, pixel] = differing[random.random_range(0..differing.len())].map(|index| index as usize);
         let residual = &residuals[view];
         let camera = &residual.frame.camera;
         let far = if residual.depth[pixel].is_finite() { residual.depth[pixel] } else { 2.0 * data.extent };
@@ -101,7 +104,7 @@ fn points(residuals: &[Residual<'_>], data: &Scene, count: usize, seed: u64) -> 
         let [u, v] = [pixel % width, pixel / width].map(|place| place as f32 + 0.5);
         let seen = Vec3::new((u - camera.cx) / camera.fx, (v - camera.cy) / camera.fy, 1.0) * z;
         let place = camera.rotation.transpose() * (seen - camera.translation);
-        let color = std::array::from_fn(|channel| residual.truth[3 * pixel + channel]);
+        let color = std::array::from_fn(|channel| f32::from(residual.truth.pixels[3 * pixel + channel]) / 255.0);
         let views = by_time.get(&residual.frame.time.to_bits()).filter(|views| views.len() >= RIG);
         let share = match views {
             Some(views) => share_differing(place, views.iter().map(|view| &residuals[*view])),

@@ -73,9 +73,10 @@ pub(crate) trait TileVisitor<L: Lanes> {
     /// The values of one splat. They are separate from the visitor so that they stay in vector registers.
     type Splat;
 
-    fn begin(&self, splat: &Splat) -> Self::Splat;
+    /// `n` counts the tile's splats from the front.
+    fn begin(&self, n: usize, splat: &Splat) -> Self::Splat;
     fn visit(&mut self, splat: &mut Self::Splat, contribution: &Contribution<L>);
-    /// `n` counts the tile's splats from the front. Only splats that hit a pixel get here.
+    /// Only splats that hit a pixel get here.
     fn end(&mut self, n: usize, splat: Self::Splat);
 }
 
@@ -85,7 +86,7 @@ pub(crate) enum Hits<'a> {
     Unasked,
     /// To be found: each splat's set is appended.
     Found(&'a mut Vec<u32>),
-    /// Found by an earlier traversal: only these groups are visited.
+    /// Found by an earlier traversal: only these groups are visited, and no splats after these.
     Known(&'a [u32]),
 }
 
@@ -103,7 +104,11 @@ pub(crate) fn walk<L: Lanes, V: TileVisitor<L>>(
     let mut pixels = pixels_at_start(view, column, row);
     let mut live = live_groups(&pixels);
 
-    for (n, &i) in lists.gaussians[lists.tile_range(tile)].iter().enumerate() {
+    let mut gaussians = &lists.gaussians[lists.tile_range(tile)];
+    if let Hits::Known(sets) = &hits {
+        gaussians = &gaussians[..sets.len()];
+    }
+    for (n, &i) in gaussians.iter().enumerate() {
         if live == 0 {
             break;
         }
@@ -115,7 +120,7 @@ pub(crate) fn walk<L: Lanes, V: TileVisitor<L>>(
         groups &= live;
         let mut hit_groups = 0;
         let ellipse = Ellipse::<L>::new(splat);
-        let mut state = visitor.begin(splat);
+        let mut state = visitor.begin(n, splat);
         while groups != 0 {
             let group = groups.trailing_zeros() as usize;
             groups &= groups - 1;

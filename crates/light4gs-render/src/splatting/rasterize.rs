@@ -29,7 +29,7 @@ impl<L: Lanes> TileVisitor<L> for TilePixels {
     type Splat = [L; 4];
 
     #[inline(always)]
-    fn begin(&self, splat: &Splat) -> [L; 4] {
+    fn begin(&self, _: usize, splat: &Splat) -> [L; 4] {
         let [red, green, blue] = splat.color;
         // Written out: with a call that is not inlined, values leave the vector registers.
         [L::splat(red), L::splat(green), L::splat(blue), L::splat(splat.depth)]

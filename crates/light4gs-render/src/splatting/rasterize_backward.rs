@@ -22,6 +22,7 @@ type Sums = [f32; 10];
 struct BackwardTile<'a> {
     lists: &'a TileLists,
     view: &'a View,
+    trained: usize,
     tile: usize,
     pixels: &'a TilePixels,
     /// In the layout of [`assemble`](super::rasterize::assemble).
@@ -35,15 +36,23 @@ impl LaneKernel for BackwardTile<'_> {
     #[inline(always)]
     fn run<L: Lanes>(self) {
         let view = self.view;
+        let hits = &self.pixels.hits;
+        let gaussians = &self.lists.gaussians[self.lists.tile_range(self.tile)][..hits.len()];
+        // `S` contains what lies behind the last of them.
+        let is_needed = |(gaussian, hits): (&u32, &u32)| (*gaussian as usize) < self.trained && *hits != 0;
+        let Some(last) = gaussians.iter().zip(hits).rposition(is_needed) else { return };
         let (column, row) = (self.tile % view.tiles_across(), self.tile / view.tiles_across());
         let upstream = tile_of(self.upstream, view, column, row);
         let rest = total_value::<L>(self.pixels, &upstream, view.background);
-        let mut visitor = Differentiate { upstream, rest, sums: self.sums };
-        walk::<L, _>(self.lists, view, self.tile, &mut visitor, Hits::Known(&self.pixels.hits));
+        let mut visitor = Differentiate { gaussians, trained: self.trained, upstream, rest, sums: self.sums };
+        walk::<L, _>(self.lists, view, self.tile, &mut visitor, Hits::Known(&hits[..=last]));
     }
 }
 
 struct Differentiate<'a> {
+    /// The tile's Gaussians, front to back.
+    gaussians: &'a [u32],
+    trained: usize,
     upstream: [TilePlane; CHANNELS],
     /// `S` minus the contributions of the splats so far.
     rest: TilePlane,
@@ -52,6 +61,8 @@ struct Differentiate<'a> {
 
 /// One splat's values and, lane by lane, its sums.
 struct Accumulator<L> {
+    /// Whether its sums are needed.
+    trained: bool,
     color: [L; 3],
     depth: L,
     linear: [L; 4],
@@ -62,9 +73,10 @@ impl<L: Lanes> TileVisitor<L> for Differentiate<'_> {
     type Splat = Accumulator<L>;
 
     #[inline(always)]
-    fn begin(&self, splat: &Splat) -> Accumulator<L> {
+    fn begin(&self, n: usize, splat: &Splat) -> Accumulator<L> {
         let [red, green, blue] = splat.color;
         Accumulator {
+            trained: (self.gaussians[n] as usize) < self.trained,
             // Written out: with a call that is not inlined, values leave the vector registers.
             color: [L::splat(red), L::splat(green), L::splat(blue)],
             depth: L::splat(splat.depth),
@@ -77,15 +89,18 @@ impl<L: Lanes> TileVisitor<L> for Differentiate<'_> {
     fn visit(&mut self, splat: &mut Accumulator<L>, contribution: &Contribution<L>) {
         let Contribution { group, dx, dy, alpha, weight, taken, free, .. } = *contribution;
         let up = load_all::<L>(&self.upstream, group);
-        let Accumulator { color, depth, linear, moments } = splat;
-        for c in 0..3 {
-            linear[c] = weight.mul_add(up[c], linear[c]);
-        }
-        linear[3] = weight.mul_add(up[4], linear[3]);
+        let Accumulator { trained, color, depth, linear, moments } = splat;
         let value = color[0].mul_add(up[0], color[1].mul_add(up[1], color[2].mul_add(up[2], depth.mul(up[4]))));
         let here = weight.mul(value);
         let left = L::load(&self.rest[group]).sub(here);
         left.store(&mut self.rest[group]);
+        if !*trained {
+            return;
+        }
+        for c in 0..3 {
+            linear[c] = weight.mul_add(up[c], linear[c]);
+        }
+        linear[3] = weight.mul_add(up[4], linear[3]);
         // alpha · dS/dalpha, with alpha folded into the weight.
         let behind = alpha.mul(left).div(L::splat(1.0).sub(alpha));
         let p = taken.and(free).and(here.sub(behind));
@@ -100,6 +115,9 @@ impl<L: Lanes> TileVisitor<L> for Differentiate<'_> {
 
     #[inline(always)]
     fn end(&mut self, n: usize, splat: Accumulator<L>) {
+        if !splat.trained {
+            return;
+        }
         let sums = &mut self.sums[n];
         let Accumulator { linear: l, moments: m, .. } = splat;
         sums[..LANES].copy_from_slice(&L::sums(&[l[0], l[1], l[2], l[3], m[0], m[1], m[2], m[3]]));
@@ -136,7 +154,7 @@ fn total_value<L: Lanes>(pixels: &TilePixels, upstream: &[TilePlane; CHANNELS], 
     total
 }
 
-/// Gradients of all inputs, in the layouts of [`GaussianSlices`].
+/// Gradients of all inputs, in the layouts of [`GaussianSlices`]. Those of Gaussians that are not trained are zero.
 #[derive(Clone, Debug)]
 pub struct GaussianGradients {
     /// `[N, 3]`.
@@ -157,9 +175,10 @@ pub struct GaussianGradients {
 
 /// Chain rule from the gradient of an image to those of the Gaussians. `gaussians`, `view` and `lists` are those of the
 /// image, and `pixels` those of [`rasterize`](crate::rasterize). `upstream` is the gradient of the loss by
-/// the `5 H W` numbers of [`assemble`](crate::assemble), in the same layout.
+/// the `5 H W` numbers of [`assemble`](crate::assemble), in the same layout. Only the first `trained` Gaussians get gradients.
 pub fn splat_backward(
     gaussians: &GaussianSlices,
+    trained: usize,
     view: &View,
     lists: &TileLists,
     pixels: &[TilePixels],
@@ -167,7 +186,7 @@ pub fn splat_backward(
 ) -> GaussianGradients {
     let mut sums: Vec<Sums> = vec![[0.0; 10]; lists.gaussians.len()];
     lists.split_by_tile(&mut sums).into_par_iter().enumerate().for_each(|(tile, sums)| {
-        dispatch(BackwardTile { lists, view, tile, pixels: &pixels[tile], upstream, sums });
+        dispatch(BackwardTile { lists, view, trained, tile, pixels: &pixels[tile], upstream, sums });
     });
 
     let count = gaussians.len();
@@ -199,6 +218,9 @@ pub fn splat_backward(
         .for_each(|(chunk, ((((((means, quats), scales), opacities), dc), sh_rest), offsets))| {
             for (k, opacity) in opacities.iter_mut().enumerate() {
                 let i = chunk * CHUNK + k;
+                if i >= trained {
+                    break;
+                }
                 let Some(total) = lists.sum_of(i, &sums) else { continue };
                 let splat = &lists.splats[i];
                 let gradient = splat_gradient(splat.conic, splat.opacity, total);

@@ -39,7 +39,7 @@ impl<L: Lanes> TileVisitor<L> for Score<'_> {
     type Splat = [L; 3];
 
     #[inline(always)]
-    fn begin(&self, _: &Splat) -> [L; 3] {
+    fn begin(&self, _: usize, _: &Splat) -> [L; 3] {
         [L::splat(0.0); 3]
     }
 

@@ -30,7 +30,7 @@ fn kernels() -> Vec<Kernel> {
 /// Scores `[N, 3]`; see [`SCORES`].
 fn scores(inputs: SplatInputs<CubeBackend>, view: View) -> Result<CubeTensor, GpuError> {
     let gpu = Gpu::of(&inputs.means)?;
-    let Begun { frame, intersections: lists, .. } = begin(&gpu, inputs, SplatView { view, room: None })?;
+    let Begun { frame, intersections: lists, .. } = begin(&gpu, inputs, SplatView { view, room: None, trained: None })?;
     let sums = gpu.allocate("sums of intersections", SUMS * lists.count)?;
     let chunks = frame.chunks(lists.count);
     let carried = gpu.allocate("pixels between chunks", if chunks > 1 { frame.pixels() } else { 0 })?;

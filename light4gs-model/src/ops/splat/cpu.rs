@@ -17,6 +17,7 @@ pub struct CpuSaved {
     inputs: [HostTensor; INPUTS],
     shapes: [Vec<usize>; INPUTS],
     view: View,
+    trained: usize,
     lists: Arc<TileLists>,
     pixels: Arc<Vec<TilePixels>>,
 }
@@ -28,7 +29,7 @@ pub(in crate::ops) fn slices(inputs: &[HostTensor; INPUTS]) -> GaussianSlices<'_
 
 fn forward_on_cpu<B: HostBackend>(
     inputs: SplatInputs<B>,
-    SplatView { view, .. }: SplatView,
+    SplatView { view, trained, .. }: SplatView,
 ) -> (SplatOutputs<B>, CpuSaved) {
     let inputs = inputs.into_array();
     let device = inputs[0].device();
@@ -44,14 +45,16 @@ fn forward_on_cpu<B: HostBackend>(
         radii: B::int_from_data(TensorData::new(radii, [count]), &device),
         intersections: B::int_from_data(TensorData::from([lists.intersections() as i32]), &device),
     };
-    (outputs, CpuSaved { inputs, shapes, view, lists: Arc::new(lists), pixels: Arc::new(pixels) })
+    let trained = trained.unwrap_or(count);
+    (outputs, CpuSaved { inputs, shapes, view, trained, lists: Arc::new(lists), pixels: Arc::new(pixels) })
 }
 
 fn backward_on_cpu<B: HostBackend>(saved: CpuSaved, gradient: FloatTensor<B>) -> SplatInputs<B> {
     let upstream = B::to_host(gradient);
-    let g = splat_backward(&slices(&saved.inputs), &saved.view, &saved.lists, &saved.pixels, upstream.as_slice());
+    let CpuSaved { inputs, shapes, view, trained, lists, pixels } = saved;
+    let g = splat_backward(&slices(&inputs), trained, &view, &lists, &pixels, upstream.as_slice());
     let values = [g.means, g.quats, g.scales, g.opacities, g.sh_dc, g.sh_rest, g.screen_offsets];
-    let mut shapes = saved.shapes.into_iter();
+    let mut shapes = shapes.into_iter();
     SplatInputs::from_array(
         values.map(|values| B::from_values(values, shapes.next().expect("a shape for every input"))),
     )

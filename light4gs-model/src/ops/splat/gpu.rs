@@ -230,7 +230,7 @@ pub(in crate::ops) struct Begun {
 pub(in crate::ops) fn begin(gpu: &Gpu, inputs: SplatInputs<CubeBackend>, view: SplatView) -> Result<Begun, GpuError> {
     let inputs = inputs.into_array();
     let shapes = inputs.each_ref().map(|tensor| tensor.shape());
-    let SplatView { view, room } = view;
+    let SplatView { view, room, .. } = view;
     let frame = Frame {
         view,
         room,

@@ -78,13 +78,15 @@ pub struct SplatView {
     /// Intersections that there is room for; `None`: for all. Only a GPU has to know.
     #[cfg_attr(not(feature = "wgpu"), allow(dead_code))]
     pub(crate) room: Option<usize>,
+    /// Gaussians that need gradients: the first ones; `None`: all. The gradients of the others may be zero.
+    pub(crate) trained: Option<usize>,
 }
 
 impl SplatView {
     /// The image of `camera` over `background` (red, green, blue). `sh_degree` (0 to 3) is the highest degree of the spherical
     /// harmonics that is used; `sh_rest` must have at least its `(degree + 1)^2 - 1` coefficients.
     pub fn new(camera: Camera, background: [f32; 3], sh_degree: usize) -> Self {
-        Self { view: View { camera, background, sh_degree }, room: None }
+        Self { view: View { camera, background, sh_degree }, room: None, trained: None }
     }
 }
 
