@@ -16,12 +16,12 @@ keys! {
     pub struct HexPlaneConfig {
         /// Number of features of a plane.
         channels: usize = 32; Whole { least: 1, most: 1024 }, "paper: 32 for D-NeRF, 16 for real scenes";
-        /// Resolution along x, y, z, t at the lowest scale; each is a multiple of 4.
+        /// Resolution of the planes along x, y, z, t, each a multiple of 4, before it is multiplied by `multipliers`.
         resolution: [usize; 4] = [64, 64, 64, 24];
             List { element: &Whole { least: 4, most: MOST_PLANE_RESOLUTION as u64 }, length: Some(4) },
             "paper; its 25 time steps are no multiple of 4";
-        /// Ascending numbers, one for each scale of planes. The spatial resolution of a scale is `resolution` times the
-        /// number of the scale; the resolution in time is the same at all scales.
+        /// Ascending numbers, one for each scale of planes. The spatial resolution of a scale is `resolution` times
+        /// this number; the resolution in time is the same at all scales.
         multipliers: Vec<usize> = vec![1, 2];
             List { element: &Whole { least: 1, most: MOST_PLANE_RESOLUTION as u64 / 4 }, length: None }, "paper";
     }

@@ -10,7 +10,7 @@ use crate::planes::FeaturePlanes;
 keys! {
     /// Weights of the space-time regularizers, fine stage only.
     pub struct PlaneRegularizer {
-        /// Weight of the mean squared second difference of the space-only planes along their height.
+        /// Weight of the mean squared second difference of the space-only planes along their second axis (y or z).
         plane_smoothness: f32 = 1e-4; WEIGHT, "reference";
         /// Weight of the mean squared second difference of the space-time planes along time.
         time_smoothness: f32 = 1e-2; WEIGHT, "reference";

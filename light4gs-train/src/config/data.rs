@@ -65,8 +65,8 @@ keys! {
         layout: Option<String> = None;
             NameOrNone { what: "layout", none: "found by content", names: || Layouts::default().names() },
             "ours";
-        /// Length of the sequence in frames; later frames are left out. Where the dataset numbers its frames (`neu3d`),
-        /// frame `i` has the time `i` divided by this length. 0 means all frames.
+        /// Only for the layout `neu3d`: length of the sequence in frames. Later frames are left out, and frame `i` has
+        /// the time `i` divided by this length. 0 means all frames.
         #[serde(with = "optional")]
         frames: Option<usize> = None;
             WholeOrNone { least: 1, most: 1_000_000 },
@@ -74,10 +74,11 @@ keys! {
         /// Frames per second of the capture, from which its length in seconds follows. A number below 0.001 means the
         /// frame rate that the capture's files state, if they state one.
         frames_a_second: f64 = 0.0; Number { least: 0.0, most: 1e5 }, "ours";
-        /// First and last time of the images that are used, as shares of the capture. In the run of a take's segment,
-        /// these are the times on which the segment is trained.
+        /// First and last time of the images that are used, as shares of the capture's length. In the run of a take's
+        /// segment, these are the times on which the segment is trained.
         between: [f64; 2] = [0.0, 1.0]; List { element: &SHARE, length: Some(2) }, "ours";
-        /// Largest number of times that are used. The used times are spread evenly. 0 means that all times are used.
+        /// Training uses frames of at most this number of different times, which are spread evenly over the capture. 0
+        /// means that all times are used.
         #[serde(with = "optional")]
         most_times: Option<usize> = None; WholeOrNone { least: 1, most: 1_000_000 }, "ours";
         /// Largest number of pixels of an image's longer side; larger images are reduced to it, keeping their shape. 0
@@ -88,7 +89,7 @@ keys! {
         /// Color behind transparent pixels, each channel 0 to 1.
         background: [f32; 3] = [1.0; 3]; List { element: &SHARE, length: Some(3) }, "reference, D-NeRF: white";
         /// Where the times of images come from, if a dataset in the layout `colmap` or `nerfstudio` has none. `light4gs
-        /// check` prints which of these was read.
+        /// check` prints which of the sources listed here was used.
         times: TimesKind = TimesKind::Auto; TimesKind::BOUNDS, "ours";
         /// How images are grouped into cameras, in the layouts `colmap` and `nerfstudio`.
         cameras: CamerasKind = CamerasKind::Auto; CamerasKind::BOUNDS, "ours";

@@ -57,7 +57,7 @@ pub const MAX_CONFIG_BYTES: u64 = 1 << 20;
 keys! {
     /// The complete configuration of a run.
     pub struct Config {
-        /// Seed of everything random in a run: scattering, splitting, the order of frames.
+        /// Seed of everything random in a run: the scattering and the splitting of Gaussians, the order of frames.
         seed: u64 = 0; Whole { least: 0, most: MOST_INTEGER }, "ours";
         /// Back end that computes: `auto` (a graphics card where there is one, otherwise the processor), `ndarray`,
         /// `flex`, or `wgpu`. After `wgpu` an adapter can be named: `wgpu:0` (by number), `wgpu:discrete`,

@@ -55,7 +55,7 @@ keys! {
         /// `"camera"` is for rigs that stand still. With `"frame"`, a camera that stands still gets one correction for
         /// all of its frames.
         poses: CorrectionUnit = CorrectionUnit::None; CorrectionUnit::BOUNDS, "ours";
-        /// The times of each camera of a rig are corrected by an offset.
+        /// Whether the times of each camera of a rig are corrected by a learned offset.
         time_offsets: bool = false; Flag, "ours";
         /// How corrections are learned.
         corrections: CorrectionRates;

@@ -11,11 +11,12 @@ keys! {
         /// Iterations of the fine stage after which Gaussians are added; empty = never.
         iterations: Vec<usize> = Vec::new();
             List { element: &INTERVAL, length: None }, "after Li et al. 2024";
-        /// Number of new Gaussians for each training time, at pixels of one frame of that time. The number is smaller
-        /// if few pixels are unexplained. With the new Gaussians, there may be more Gaussians than
-        /// `train.densify.adaptive.max_gaussians`.
+        /// Number of Gaussians that are added for each point of time with training frames, at pixels of one random
+        /// frame of that time. Fewer are added if few pixels are unexplained. With the added Gaussians, there may be
+        /// more Gaussians than `train.densify.adaptive.max_gaussians`.
         count: usize = 100; Whole { least: 1, most: 1_000_000 }, "ours";
-        /// Standard deviation of the new Gaussians' lifetimes, in intervals between training times.
+        /// Standard deviation of the added Gaussians' lifetimes. The unit is the mean interval between neighboring
+        /// points of time with training frames.
         lifetime: f64 = 0.6; Number { least: 0.01, most: 1e6 }, "ours";
     }
 }

@@ -14,7 +14,7 @@ keys! {
     pub struct WideningWindow {
         /// Length of the survey, as a share of the fine stage: frames of all times are drawn before the first window begins.
         survey: f64 = 0.0; SHARE, "ours";
-        /// The middle of the first window, as a share of all times.
+        /// The middle of the first window, in the order of all training times: 0 is the first of them, 1 the last.
         center: f64 = 0.5; SHARE, "ours";
         /// Number of different times in the first window.
         times: usize = 12; Whole { least: 1, most: 1_000_000 }, "ours";

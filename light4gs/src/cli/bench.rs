@@ -24,10 +24,11 @@ pub(super) struct Bench {
     /// A scene file, which is timed instead of generated scenes (layout: docs/benchmarks.md).
     #[arg(long, value_name = "FILE.safetensors", conflicts_with_all = ["gaussians", "size"])]
     scene: Vec<PathBuf>,
-    /// Gaussians of the generated scenes.
+    /// Numbers of Gaussians of the generated scenes, separated by commas.
     #[arg(long, value_delimiter = ',', default_value = "5000,20000,100000", allow_negative_numbers = true)]
     gaussians: Vec<usize>,
-    /// Widths and heights of the generated scenes' images.
+    /// Sizes of the generated scenes' images in pixels, separated by commas; each size is both the width and the
+    /// height.
     #[arg(long, value_delimiter = ',', default_value = "400,800", allow_negative_numbers = true)]
     size: Vec<u32>,
     /// Timed repetitions of each part, after two untimed ones.

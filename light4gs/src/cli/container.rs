@@ -177,7 +177,7 @@ fn is_inside(out: &Path, root: &Path) -> bool {
 
 #[derive(Debug, Args)]
 pub(super) struct Info {
-    /// The file.
+    /// The .l4gs file.
     file: PathBuf,
     /// Print as JSON.
     #[arg(long)]
@@ -275,7 +275,7 @@ fn motion_layers(info: &StreamInfo) -> usize {
 
 #[derive(Debug, Args)]
 pub(super) struct Decode {
-    /// The file.
+    /// The .l4gs file.
     file: PathBuf,
     /// The safetensors file to write.
     #[arg(long)]

@@ -29,7 +29,7 @@ enum Source {
 
 #[derive(Debug, Args)]
 pub(super) struct Import {
-    /// The folder or the file.
+    /// The folder or the file that the other program has written.
     source: PathBuf,
     /// The kind of source.
     #[arg(long, value_enum)]

@@ -57,7 +57,7 @@ enum Command {
                             middle.mp4 right.mp4 --out data/stage\n  light4gs train data/walk --out runs/walk")]
     Prepare(prepare::Prepare),
     /// Before anything is trained, print what is read from a dataset: cameras, times, lens, masks, points, unused
-    /// images. The exit code is 2 if a training could only fail.
+    /// images. The exit code is 2 if no training on this dataset can work.
     #[command(after_help = "Example:\n  light4gs check data/walk --html walk.html")]
     Check(check::Check),
     /// Train on a dataset, or on videos (which are first prepared).

@@ -20,7 +20,7 @@ keys! {
     pub struct DeformationConfig {
         /// Width of the deformation network.
         width: usize = 64; Whole { least: 1, most: 4096 }, "paper, D-NeRF";
-        /// Layers before the heads. 0 means the same as 1.
+        /// Number of the network's layers before its heads. 0 means the same as 1.
         depth: usize = 1; Whole { least: 0, most: 64 }, "reference";
         /// Whether positions move with time.
         position: bool = true; Flag, "reference";

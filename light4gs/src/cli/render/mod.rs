@@ -55,7 +55,7 @@ pub(super) struct Render {
     /// Distance of the orbit from the origin, world units.
     #[arg(long, default_value_t = ORBIT.0, allow_negative_numbers = true)]
     radius: f32,
-    /// Height of the orbit in degrees.
+    /// Angle of the orbit above the horizon, in degrees.
     #[arg(long, default_value_t = ORBIT.1, allow_negative_numbers = true)]
     elevation: f32,
     /// Frames per second of a GIF or an MP4.

@@ -69,7 +69,7 @@ keys! {
     pub struct NodesFieldConfig {
         /// Number of nodes; never more than there are Gaussians.
         count: usize = 32; Whole { least: 1, most: MOST_NODES as u64 }, "ours; SC-GS: 512";
-        /// Number of training times from one knot of a trajectory to the next.
+        /// Number of points of time with training frames from one knot of a trajectory to the next.
         times_a_knot: f64 = 4.0; Number { least: 0.1, most: 1e6 }, "ours";
         /// A node's radius at the beginning, as a share of the distance to the nearest other node.
         radius: f64 = 0.6; Number { least: 0.01, most: 100.0 }, "ours";
