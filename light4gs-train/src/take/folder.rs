@@ -24,6 +24,8 @@ const BASE_FROM_SEGMENT: &str = "../../base/scene.l4gs";
 /// Images of the base, about: enough to see every place several times, few enough to be read quickly.
 const BASE_IMAGES: usize = 300;
 const FEWEST_BASE_TIMES: usize = 24;
+/// MiB of decoded images that any training keeps.
+const LEAST_IN_MEMORY: u64 = 16;
 /// At most, bytes of a take's front without the rows of its segments, and of a row with the hidden list of a segment.
 const FRONT_BYTES: usize = 1500;
 const ROW_BYTES: usize = 500;
@@ -35,6 +37,8 @@ pub struct TakeRecord {
     pub scene: PathBuf,
     /// Times from which the base is trained.
     pub base_times: usize,
+    /// MiB of the training images of the longest segment: the base keeps no more in memory than that.
+    pub images_of_segment_mib: u64,
     /// The segments.
     pub plan: TakePlan,
 }
@@ -63,6 +67,7 @@ impl TakeFolder {
         let record = TakeRecord {
             scene: std::path::absolute(scene).map_err(DataError::io("find", scene))?,
             base_times: (BASE_IMAGES / cameras).max(FEWEST_BASE_TIMES),
+            images_of_segment_mib: images_of_segment(data, &plan).div_ceil(1 << 20),
             plan,
         };
         let folder = Self { root: root.to_owned(), record, config: config.clone() };
@@ -177,6 +182,8 @@ impl TakeFolder {
         *most = (*most as f64 * growth).round() as usize;
         config.model.field = FieldKind::Still;
         config.data.most_times = Some(self.record.base_times);
+        let in_memory = &mut config.data.memory_limit_mib;
+        *in_memory = self.record.images_of_segment_mib.clamp(LEAST_IN_MEMORY, *in_memory);
         config.train.sampling = SamplerKind::Shuffled;
         config.train.guided_sampling.iterations.clear();
         config.train.losses.photometric.l2_until = 0;
@@ -263,6 +270,13 @@ impl TakeFolder {
         write_atomically(&self.file(), |file| file.write_all(&bytes))?;
         Ok(bytes.len() as u64)
     }
+}
+
+/// Bytes of the decoded training images of the longest segment.
+fn images_of_segment(data: &Scene, plan: &TakePlan) -> u64 {
+    let all: u64 = data.train.iter().map(|frame| 3 * u64::from(frame.camera.width) * u64::from(frame.camera.height)).sum();
+    let longest = plan.segments.iter().map(|segment| segment.trained_frames).max().unwrap_or(0);
+    all / plan.frames.max(1) as u64 * longest as u64
 }
 
 /// What lies in a folder and is not of a take that was stopped before it had its record.
