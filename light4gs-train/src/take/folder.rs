@@ -274,7 +274,8 @@ impl TakeFolder {
 
 /// Bytes of the decoded training images of the longest segment.
 fn images_of_segment(data: &Scene, plan: &TakePlan) -> u64 {
-    let all: u64 = data.train.iter().map(|frame| 3 * u64::from(frame.camera.width) * u64::from(frame.camera.height)).sum();
+    let all: u64 =
+        data.train.iter().map(|frame| 3 * u64::from(frame.camera.width) * u64::from(frame.camera.height)).sum();
     let longest = plan.segments.iter().map(|segment| segment.trained_frames).max().unwrap_or(0);
     all / plan.frames.max(1) as u64 * longest as u64
 }
