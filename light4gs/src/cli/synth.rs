@@ -24,7 +24,7 @@ pub(super) struct Synth {
     /// Validation images.
     #[arg(long, default_value_t = 10, allow_negative_numbers = true, conflicts_with = "seconds")]
     val_frames: usize,
-    /// Seed of the cameras.
+    /// Seed of the scene and of its cameras.
     #[arg(long, default_value_t = 0, allow_negative_numbers = true)]
     seed: u64,
     /// Make a take of this number of seconds: a room in which objects come, go and rest.

@@ -31,7 +31,7 @@ pub(super) struct LaunchOptions {
     /// Where the tasks run: the runs of a study, or the base and the segments of a take.
     #[arg(long, value_enum, default_value = "local")]
     pub(super) launcher: Launcher,
-    /// Number of these tasks that run at the same time.
+    /// Number of tasks (see --launcher) that run at the same time.
     #[arg(long, default_value_t = 1, value_parser = clap::value_parser!(u32).range(1..=10_000))]
     pub(super) jobs: u32,
     /// TOML file with partition, account, GPUs for each task, and wall time; see docs/studies.md.

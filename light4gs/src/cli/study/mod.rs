@@ -50,9 +50,9 @@ pub(super) struct Study {
     /// the file is written share one training.
     #[arg(long)]
     out: Option<PathBuf>,
-    /// The preset or TOML file that variants start from, in place of the study's own or of hexplane-dnerf-cpu; {scene}
-    /// in this name stands for the scene's name. If a value of an axis of the study names a preset of its own, the
-    /// value keeps that preset.
+    /// The preset or TOML file that variants start from, in place of the study's own preset, or of hexplane-dnerf-cpu
+    /// if the study names none; {scene} in this name stands for the scene's name. If a value of an axis of the study
+    /// names a preset of its own, the value keeps that preset.
     #[arg(long, value_name = "PRESET|FILE")]
     config: Option<String>,
     /// Factor by which the length of every variant's schedule is multiplied, such as 0.25 for a first look.
