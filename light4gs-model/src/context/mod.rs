@@ -53,7 +53,7 @@ use light4gs_keys::{choice, keys};
 choice! {
     /// A part of a [`ContextModel`]. An ablation leaves some out.
     pub enum ContextPart: "part" {
-        /// A transmitted latent for planes that nothing else describes.
+        /// A transmitted latent for planes that no context from other planes describes.
         Hyperprior = "hyperprior",
         /// Anchors are coded first, then the other positions with the anchors as context.
         Checkerboard = "checkerboard",
@@ -100,7 +100,7 @@ keys! {
         /// Sizes of the context model's networks.
         architecture: ContextArchitecture = ContextArchitecture::Compact;
             ContextArchitecture::BOUNDS, "ours; reference";
-        /// The parts of the context model; the default is the paper's four. The public code also has
+        /// The parts of the context model; the default is the paper's four parts. The public code also has
         /// `"high_scale_hyperprior"`, which needs `"hyperprior"` and `"inter_scale"`. Without any part, every channel
         /// has one learned distribution.
         parts: Vec<ContextPart> = ContextPart::PAPER.to_vec();

@@ -14,7 +14,7 @@ pub const MOST_PLANE_RESOLUTION: usize = 4096;
 keys! {
     /// Sizes of the multiscale hexplane.
     pub struct HexPlaneConfig {
-        /// Number of features of a plane.
+        /// Number of channels of each plane: it holds this many numbers at each of its points.
         channels: usize = 32; Whole { least: 1, most: 1024 }, "paper: 32 for D-NeRF, 16 for real scenes";
         /// Resolution of the planes along x, y, z, t, each a multiple of 4, before it is multiplied by `multipliers`.
         resolution: [usize; 4] = [64, 64, 64, 24];

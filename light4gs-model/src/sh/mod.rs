@@ -144,7 +144,7 @@ keys! {
     pub struct ShConfig {
         /// Entropy model of the spherical harmonics beyond degree 0. Only scenes of degree 3 have such a model. The
         /// densities of `"factorized"` and `"mixture_of_logistics"` are the same for all Gaussians. In the `compact`
-        /// profile the file does not use these two models, because prediction from neighbors saves more.
+        /// profile the file does not use these two models, because prediction from neighboring Gaussians saves more.
         model: ShKind = ShKind::Factorized; ShKind::BOUNDS, "paper";
         /// Quantization step of the spherical harmonics beyond degree 0.
         step: f64 = 0.02; QUANTIZATION_STEP, "paper";

@@ -16,9 +16,9 @@ keys! {
         profile: FileProfile = FileProfile::Compact;
             FileProfile::BOUNDS,
             "ours; paper";
-        /// Upper bound of the file in bytes; the file uses nearly all of it. Training adapts the weight of the rate, and the
-        /// encoder adapts the steps of the attributes. 0 means no bound; then the size follows from lambda and the
-        /// quantization steps.
+        /// Upper bound of the file's size in bytes; the file is hardly smaller than this bound. Training adapts the
+        /// weight of the rate, and the encoder adapts the steps of the attributes. 0 means no bound; then the size
+        /// follows from lambda and the quantization steps.
         target_bytes: usize = 0; Whole { least: 0, most: 1_000_000_000_000 }, "ours";
         /// Lower bound of the PSNR of the decoded file on the test views (on the training views if there are none), in
         /// dB. The file is hardly better than this bound, since the weight of the rate and the quantization steps are
@@ -97,7 +97,7 @@ keys! {
         fraction: f64 = 0.125; Number { least: 1e-6, most: 1.0 }, "ours";
         /// From this iteration of the fine stage on, the planes have quantization noise and the rate is part of the
         /// loss. For spherical harmonics, both begin when densification is over.
-        from: usize = 1000; ITERATION, "reference: 3; SH 2000";
+        from: usize = 1000; ITERATION, "reference: 3, and 2000 for spherical harmonics";
         /// Iteration of the fine stage after which the planes are frozen: they take the values that the file will have,
         /// and only the rest of the scene is still trained. 0 means never.
         planes_until: usize = 27_000;

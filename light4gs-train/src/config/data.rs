@@ -16,7 +16,7 @@ choice! {
         Auto = "auto",
         /// The last number in the images' names.
         Number = "number",
-        /// The place of the image's name in the natural order of its camera's names.
+        /// The place of the image's name in the natural order of the names of its camera's images.
         Order = "order",
     }
 }
@@ -81,8 +81,8 @@ keys! {
         /// means that all times are used.
         #[serde(with = "optional")]
         most_times: Option<usize> = None; WholeOrNone { least: 1, most: 1_000_000 }, "ours";
-        /// Largest number of pixels of an image's longer side; larger images are reduced to it, keeping their shape. 0
-        /// leaves all images as they are. `train --pixels` sets this key.
+        /// Largest number of pixels of an image's longer side; larger images are scaled down to it and keep their
+        /// aspect ratio. 0 leaves all images as they are. `train --pixels` sets this key.
         #[serde(with = "optional")]
         resolution: Option<u32> = None;
             WholeOrNone { least: 8, most: 16_384 }, "ours";

@@ -86,9 +86,9 @@ impl TrainConfig {
 }
 
 keys! {
-    /// Training begins with smaller images, and with fewer Gaussians for them. An iteration with smaller images takes a
-    /// fraction of the time. In the coarse stage, images have the size with which the fine stage begins. No side of an
-    /// image is made shorter than 200 pixels.
+    /// Training begins with smaller images. While images are smaller, `max_gaussians` is reduced too. An iteration with
+    /// smaller images takes a fraction of the time. In the coarse stage, images have the size with which the fine stage
+    /// begins. No side of an image is made shorter than 200 pixels.
     pub struct CoarseToFineConfig {
         /// Images have a quarter of their width and height until this share of the fine stage is over. 0 means never.
         quarter_until: f64 = 0.0; SHARE, "ours";

@@ -63,10 +63,10 @@ keys! {
 }
 
 keys! {
-    /// How corrections of exposures, poses and times are learned. The rates are Adam's learning rates at the beginning
-    /// and at the end of a run that looks at each frame or camera a hundred times. If a run looks at them less often,
-    /// its learning rates are larger in proportion, but at most three times as large. If a run looks at them more
-    /// often, its learning rates are smaller in proportion, but at least a fifth as large.
+    /// How corrections of exposures, poses and times are learned. The keys that end in `_init` and `_final` are Adam's
+    /// learning rates at the beginning and at the end of a run that looks at each frame or camera a hundred times. If a
+    /// run looks at them less often, its learning rates are larger in proportion, but at most three times as large. If
+    /// a run looks at them more often, its learning rates are smaller in proportion, but at least a fifth as large.
     pub struct CorrectionRates {
         /// Poses and times are corrected from this iteration on, since before it there is no scene to compare with.
         /// Iterations are counted over both stages.

@@ -29,7 +29,7 @@ keys! {
         from: usize = 500; ITERATION, "3DGS";
         /// Cloning, splitting and opacity reset end before this iteration.
         until: usize = 15_000; ITERATION, "reference; the paper says 14000";
-        /// Iterations between two rounds of cloning and splitting.
+        /// Number of iterations from one round of cloning and splitting to the next.
         interval: usize = 100; INTERVAL, "reference";
         /// Screen-space gradient (in half-image units) above which a Gaussian is cloned or split in the coarse stage.
         grad_threshold_coarse: f32 = 2e-4; THRESHOLD, "3DGS";
@@ -38,7 +38,8 @@ keys! {
         /// Screen-space gradient above which a Gaussian is cloned or split, at the iteration `until` of the fine stage.
         /// Up to this iteration, the threshold changes linearly from `grad_threshold_fine_init`.
         grad_threshold_fine_final: f32 = 2e-4; THRESHOLD, "reference";
-        /// Gaussians up to this share of the scene's extent are cloned, and larger ones are split in two.
+        /// Gaussians whose largest scale is at most this share of the scene's extent are cloned, and larger ones are
+        /// split in two.
         percent_dense: f32 = 0.01; Number { least: 1e-9, most: 1e9 }, "3DGS";
         /// Largest number of Gaussians. At this bound, the Gaussians with the largest gradients are cloned or split
         /// first.

@@ -5,8 +5,8 @@ use light4gs_keys::{INTERVAL, choice, keys};
 use light4gs_model::{PixelContribution as Sum, Sensitivity, Significance, VolumeWeight};
 
 keys! {
-    /// Significance pruning (STP, paper III-B). Passes of pruning follow densification. Each pass drops the Gaussians
-    /// that contribute least to the training views, at the times of these views.
+    /// Significance pruning (STP, paper III-B). Pruning takes place in passes, after the end of densification. Each
+    /// pass drops the Gaussians that contribute least to the training views, at the times of these views.
     pub struct PruneConfig {
         /// Share of the Gaussians that each pass drops; 0 = never. Two passes with 0.1, 0.2, 0.3 or 0.4 together drop
         /// 19, 36, 51 or 64 %.

@@ -11,7 +11,7 @@ keys! {
     /// `(1 - lambda) · L1 + lambda · (1 - SSIM)`, or the squared difference in the first iterations. This is the
     /// default loss.
     pub struct PhotometricLoss {
-        /// Weight of D-SSIM in the loss, 0 to 1; the rest is the weight of L1.
+        /// The weight lambda of `1 - SSIM` in the loss. The weight of L1 is `1 - lambda`.
         lambda_dssim: f32 = 0.0; SHARE, "reference";
         /// The loss is the squared difference until this iteration of the fine stage, and in the whole coarse stage. 0
         /// means never. L1 is smallest at the median color, which for a fast object is the background behind it.

@@ -12,15 +12,16 @@ keys! {
     /// times that are already learned and the new ones. A survey (`survey`) shows all times first, so that the field
     /// finds where objects are. The coarse stage sees the times with which the fine stage begins.
     pub struct WideningWindow {
-        /// Length of the survey, as a share of the fine stage: frames of all times are drawn before the first window begins.
+        /// Length of the survey, as a share of the fine stage. The survey draws frames of all times, and ends when the
+        /// first window begins.
         survey: f64 = 0.0; SHARE, "ours";
         /// The middle of the first window, in the order of all training times: 0 is the first of them, 1 the last.
         center: f64 = 0.5; SHARE, "ours";
         /// Number of different times in the first window.
         times: usize = 12; Whole { least: 1, most: 1_000_000 }, "ours";
-        /// Share of the fine stage's iterations after the survey during which the first window stays as it is.
+        /// The first window stays as it is until this share of the fine stage's iterations after the survey is over.
         held: f64 = 0.07; SHARE, "ours";
-        /// Share of the fine stage's iterations after the survey until the window holds all times.
+        /// The window holds all times when this share of the fine stage's iterations after the survey is over.
         open: f64 = 0.6; SHARE, "ours";
         /// Share of the drawn frames that have the newest times, while the window widens.
         newest: f64 = 0.3; SHARE, "ours";

@@ -32,7 +32,8 @@ keys! {
         opacity: bool = false; Flag, "reference: off for D-NeRF and HyperNeRF, on for Neu3D";
         /// Whether spherical harmonics change with time.
         sh: bool = false; Flag, "reference: off for D-NeRF and HyperNeRF, on for Neu3D";
-        /// Whether positions get a gradient through the hexplane query as well. In the reference, this is off.
+        /// Whether positions also get the gradient that passes through the hexplane query, and not only the gradient of
+        /// the rendering. In the reference, this is off.
         differentiate_points: bool = true; Flag, "ours";
     }
 }

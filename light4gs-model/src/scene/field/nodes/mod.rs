@@ -75,13 +75,14 @@ keys! {
         radius: f64 = 0.6; Number { least: 0.01, most: 100.0 }, "ours";
         /// Nodes are placed at Gaussians with at least this opacity.
         opacity: f64 = 0.15; Number { least: 1e-4, most: 0.999 }, "ours";
-        /// Every Gaussian learns a stillness: its skinning logit for an additional node that never moves.
+        /// Whether every Gaussian learns a stillness, which is its skinning logit for an additional node that never
+        /// moves.
         stillness: bool = true; Flag, "ours";
         /// Stillness at the beginning. For comparison: a Gaussian at a node's anchor has a skinning logit of 0 for that
         /// node.
         stillness_start: f64 = -4.0; Number { least: -30.0, most: 30.0 }, "ours";
-        /// Every Gaussian learns a lifetime, a bell curve over time by which its opacity is multiplied. Lifetimes begin
-        /// with the iteration at which the sampler's window of time holds all times.
+        /// Whether every Gaussian learns a lifetime, a bell curve over time by which its opacity is multiplied.
+        /// Lifetimes begin with the iteration at which the sampler's window of time holds all times.
         lifetime: bool = false; Flag, "ours";
         /// Length of the affinities, which are learned vectors of Gaussians and of nodes. The inner product of a
         /// Gaussian's and a node's affinity is added to the logit of the skinning weight. So a foot and the floor under
