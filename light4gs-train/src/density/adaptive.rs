@@ -33,9 +33,9 @@ keys! {
         interval: usize = 100; INTERVAL, "reference";
         /// Screen-space gradient (in half-image units) above which a Gaussian is cloned or split in the coarse stage.
         grad_threshold_coarse: f32 = 2e-4; THRESHOLD, "3DGS";
-        /// Screen-space gradient above which a Gaussian is cloned or split, at the start of the fine stage.
+        /// Threshold at the start of the fine stage: a Gaussian with a larger screen-space gradient is cloned or split.
         grad_threshold_fine_init: f32 = 2e-4; THRESHOLD, "reference";
-        /// Screen-space gradient above which a Gaussian is cloned or split, at the iteration `until` of the fine stage.
+        /// Threshold at the iteration `until` of the fine stage: a Gaussian with a larger screen-space gradient is cloned or split.
         /// Up to this iteration, the threshold changes linearly from `grad_threshold_fine_init`.
         grad_threshold_fine_final: f32 = 2e-4; THRESHOLD, "reference";
         /// Gaussians whose largest scale is at most this share of the scene's extent are cloned, and larger ones are
@@ -46,9 +46,9 @@ keys! {
         max_gaussians: usize = 360_000; Whole { least: 1, most: MOST_GAUSSIANS }, "reference; the largest first: ours";
         /// Opacity below which a Gaussian counts as faint and is removed, in the coarse stage.
         opacity_threshold: f32 = 0.005; SHARE, "3DGS";
-        /// Opacity below which a Gaussian counts as faint and is removed, at the start of the fine stage.
+        /// Threshold at the start of the fine stage: a Gaussian with a lower opacity counts as faint and is removed.
         opacity_threshold_fine_init: f32 = 0.005; SHARE, "reference";
-        /// Opacity below which a Gaussian counts as faint and is removed, at the iteration `until` of the fine stage.
+        /// Threshold at the iteration `until` of the fine stage: a Gaussian with a lower opacity counts as faint and is removed.
         /// Up to this iteration, the threshold changes linearly from `opacity_threshold_fine_init`.
         opacity_threshold_fine_final: f32 = 0.005; SHARE, "reference";
         /// The removal of faint Gaussians starts after this iteration.
