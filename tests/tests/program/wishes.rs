@@ -55,7 +55,7 @@ fn large_images_of_a_camera_that_jumps_are_trained_thoroughly() {
         assert_success(&output);
         let configuration = fs::read_to_string(w.path(run).join("config.toml")).unwrap();
         let told = String::from_utf8_lossy(&output.stderr).contains("dnerf+thorough");
-        assert_eq!(told, configuration.contains("smoothness = 3.0"), "{run}");
+        assert_eq!(told, configuration.contains("cooldown = 0.5"), "{run}");
         told
     };
     assert!(train("large", &["--pixels", "400"]));
