@@ -20,7 +20,7 @@ class Scene:
     size = (336, 252)
     opening = math.radians(58)
     frames = 30
-    samples = 16
+    samples = 24
     surroundings = room.WALLS
 
     def build(self):
