@@ -23,7 +23,7 @@ class Scene:
     size = (320, 180)
     opening = math.radians(50)
     frames = 30
-    samples = 10
+    samples = 8
     surroundings = room.WALLS
 
     def build(self):

@@ -18,7 +18,7 @@ class Scene:
     size = (270, 480)
     opening = math.radians(38)
     frames = 60
-    samples = 8
+    samples = 6
     surroundings = room.WALLS
 
     def build(self):

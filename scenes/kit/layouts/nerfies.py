@@ -18,13 +18,15 @@ def write(scene, folder, size, frames, threads, only=None):
     pair = scene.layout == "nerfds"
     lens = cameras.Lens(size[0] * SHRINK, size[1] * SHRINK, scene.opening)
     views = {_name(view, pair): view for view in scene.views() if view.frame < frames}
-    _write_cameras(folder, views, lens, pair)
+    cloud = folder / "points3D_downsample2.ply"
+    if _write_cameras(folder, views, lens, pair):
+        # Of another number of moments.
+        cloud.unlink(missing_ok=True)
     wanted = [_picture(name, view, folder / "rgb" / f"{SHRINK}x" / f"{name}.png", number) for number, (name, view) in enumerate(views.items())]
     camera = pictures.set_up(scene, lens, threads, transparent=False)
     pictures.render(scene, camera, pictures.chosen(wanted, only), size, SHRINK)
     if only is not None:
         return
-    cloud = folder / "points3D_downsample2.ply"
     if not cloud.exists():
         _write_points(scene, lens, [(view, picture.path) for view, picture in zip(views.values(), wanted)], folder, cloud, pair)
     if pair:
@@ -47,7 +49,7 @@ def _picture(name, view, path, number):
 
 
 def _write_cameras(folder, views, lens, pair):
-    """`camera/NAME.json`, and which picture was taken when and is for what."""
+    """`camera/NAME.json`, and which picture was taken when and is for what. Gives whether there were other pictures."""
     (folder / "camera").mkdir(parents=True, exist_ok=True)
     for name, view in views.items():
         # World to camera, axes of OpenCV: right, down, forward.
@@ -63,9 +65,12 @@ def _write_cameras(folder, views, lens, pair):
     })
     testing = [name for name, view in views.items() if _is_testing(view, pair)]
     training = [name for name in views if name not in testing]
-    _write_json(folder / "dataset.json", {
+    path = folder / "dataset.json"
+    before = path.read_text() if path.exists() else None
+    _write_json(path, {
         "count": len(views), "num_exemplars": len(training), "ids": list(views), "train_ids": training, "val_ids": testing,
     })
+    return before not in (None, path.read_text())
 
 
 def _write_points(scene, lens, taken, folder, path, pair):
