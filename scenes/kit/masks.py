@@ -8,7 +8,7 @@ from .paint import glow_only
 
 def write(scene, camera, masks, size, moving=255):
     """Renders the masks that are missing. The scene is of no use for pictures afterwards. `moving`: the value of what moves."""
-    missing = [mask for mask in masks if not pictures.is_there(mask.path, size)]
+    missing = pictures.missing(masks, size)
     if not missing:
         return
     _show_motion(size)

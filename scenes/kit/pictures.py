@@ -55,17 +55,22 @@ def chosen(pictures, only):
     return named
 
 
+def missing(pictures, size):
+    """Those that are not there yet."""
+    return [picture for picture in pictures if not is_there(picture.path, size)]
+
+
 def render(scene, camera, pictures, size, shrink=1):
     """Renders those that are missing. `size`: width and height of a picture, which is rendered `shrink` times as large."""
-    missing = [picture for picture in pictures if not is_there(picture.path, size)]
+    todo = missing(pictures, size)
     begun, now = time.monotonic(), None
-    for number, picture in enumerate(missing, 1):
+    for number, picture in enumerate(todo, 1):
         if picture.time != now:
             scene.move(picture.time)
             now = picture.time
         bpy.context.scene.cycles.seed = picture.seed
         take(camera, picture.matrix, picture.path, lambda image: _shrunk(image, shrink))
-        say(f"{picture.path}: {number} of {len(missing)}, {(time.monotonic() - begun) / number:.1f} s each")
+        say(f"{picture.path}: {number} of {len(todo)}, {(time.monotonic() - begun) / number:.1f} s each")
 
 
 def take(camera, matrix, path, changed):

@@ -7,6 +7,8 @@ import numpy as np
 from mathutils import Vector
 from PIL import Image
 
+# As 4DGaussians calls it.
+FILE = "points3D_downsample2.ply"
 # Samples of what moves, of things that stand, and of the large surfaces around them; so many that enough are seen.
 MOVING, STANDING, AROUND = 9000, 9000, 14000
 # What a cloud keeps of them: all, and those that move among them.
@@ -38,18 +40,17 @@ def sampled(random, surroundings):
     return Points(positions, normals, np.zeros((len(positions), 3)), np.arange(len(positions)) < MOVING)
 
 
-def seen(points, lens, views, least):
+def seen(points, scene, lens, taken, least):
     """Those points that views see, in the mean of the colors that the views have there.
 
-    `views`: (matrix, picture, whether points that move are at their place), at the time of the scene. `least`: views that must see a
-    point for it to be kept, and the same for one that moves.
+    `taken`: views with the files of their pictures. Those that move are where they were sampled at time 0 only. `least`: views that
+    must see a point for it to be kept, and the same for one that moves.
     """
     colors, counts = np.zeros((len(points.positions), 3)), np.zeros(len(points.positions))
-    for matrix, path, at_place in views:
-        pixels, depths = lens.seen(matrix, points.positions)
-        free = _free(matrix, pixels, depths, lens, points.positions)
-        if not at_place:
-            free &= ~points.moving
+    for view, path in taken:
+        scene.move(view.time)
+        candidates = ~points.moving if view.time > 0 else np.full(len(points.moving), True)
+        free, pixels = _free(candidates, view.matrix, lens, points.positions)
         with Image.open(path) as image:
             picture = np.asarray(image.convert("RGB"), float)
         colors[free] += _between(picture, pixels[free] * picture.shape[1] / lens.width)
@@ -109,10 +110,12 @@ def _triangles(mesh):
     return vertices.reshape(-1, 3).astype(float)[indices.reshape(-1, 3)]
 
 
-def _free(matrix, pixels, depths, lens, positions):
-    """Which points are inside a picture, with nothing before them."""
-    free = ((depths > 0.05) & (pixels[:, 0] > 1) & (pixels[:, 1] > 1)
+def _free(candidates, matrix, lens, positions):
+    """Which of the candidates are inside a picture, with nothing before them, and the pixels of all points."""
+    pixels, depths = lens.seen(matrix, positions)
+    free = (candidates & (depths > 0.05) & (pixels[:, 0] > 1) & (pixels[:, 1] > 1)
             & (pixels[:, 0] < lens.width - 2) & (pixels[:, 1] < lens.height - 2))
+    bpy.context.view_layer.update()
     blender, graph = bpy.context.scene, bpy.context.evaluated_depsgraph_get()
     camera = matrix[:3, 3]
     for index in np.where(free)[0]:
@@ -121,7 +124,7 @@ def _free(matrix, pixels, depths, lens, positions):
         hit, place, *_ = blender.ray_cast(graph, Vector(camera), Vector(ray / length), distance=length + 1)
         # As much as the point itself may be beside its surface.
         free[index] = hit and abs((np.array(place) - camera) @ ray / length - length) <= OFF
-    return free
+    return free, pixels
 
 
 def _between(picture, pixels):

@@ -18,11 +18,13 @@ def write(scene, folder, size, frames, threads, only=None):
     pair = scene.layout == "nerfds"
     lens = cameras.Lens(size[0] * SHRINK, size[1] * SHRINK, scene.opening)
     views = {_name(view, pair): view for view in scene.views() if view.frame < frames}
-    cloud = folder / "points3D_downsample2.ply"
+    cloud = folder / points.FILE
+    wanted = [_picture(name, view, folder / "rgb" / f"{SHRINK}x" / f"{name}.png", number) for number, (name, view) in enumerate(views.items())]
+    # Refuses another size before a file is written.
+    pictures.missing(wanted, size)
     if _write_cameras(folder, views, lens, pair):
         # Of another number of moments.
         cloud.unlink(missing_ok=True)
-    wanted = [_picture(name, view, folder / "rgb" / f"{SHRINK}x" / f"{name}.png", number) for number, (name, view) in enumerate(views.items())]
     camera = pictures.set_up(scene, lens, threads, transparent=False)
     pictures.render(scene, camera, pictures.chosen(wanted, only), size, SHRINK)
     if only is not None:
@@ -77,8 +79,8 @@ def _write_points(scene, lens, taken, folder, path, pair):
     """The cloud at time 0 as some of the training views see it, points that stand, and the extent of both and of the cameras."""
     random = np.random.default_rng(5)
     scene.move(0.0)
-    training = [(view.matrix, picture, view.frame == 0) for view, picture in taken if not _is_testing(view, pair)][::3 if pair else 4]
-    found = points.seen(points.sampled(random, scene.surroundings), lens, training, (min(2, len(training)), 1))
+    training = [(view, picture) for view, picture in taken if not _is_testing(view, pair)][::3 if pair else 4]
+    found = points.seen(points.sampled(random, scene.surroundings), scene, lens, training, (min(2, len(training)), 1))
     cloud = points.cloud(random, found)
     still = found.positions[~found.moving]
     still = still[random.choice(len(still), min(len(still), 4000), replace=False)]

@@ -26,7 +26,7 @@ def write(scene, folder, size, frames, threads, only=None):
     pictures.render(scene, camera, pictures.chosen(wanted, only), size)
     if only is not None:
         return
-    cloud = folder / "points3D_downsample2.ply"
+    cloud = folder / points.FILE
     if not cloud.exists():
         _write_points(scene, lens, [view for view in views if view.frame == 0], folder, cloud, count)
     for number in range(count):
@@ -62,8 +62,8 @@ def _write_points(scene, lens, first, folder, path, count):
     """The cloud at time 0 as the training cameras see it, and before it the poses, with depths of the cloud."""
     random = np.random.default_rng(5)
     scene.move(0.0)
-    training = [(view.matrix, _picture(folder, view, count).path, True) for view in first if view.camera != TESTING]
-    cloud = points.cloud(random, points.seen(points.sampled(random, scene.surroundings), lens, training, (2, 2)))
+    training = [(view, _picture(folder, view, count).path) for view in first if view.camera != TESTING]
+    cloud = points.cloud(random, points.seen(points.sampled(random, scene.surroundings), scene, lens, training, (2, 2)))
     rows = []
     for view in first:
         pixels, depths = lens.seen(view.matrix, cloud.positions)
