@@ -67,8 +67,8 @@ def stone_paint():
     return paint.surface(shade, roughness=0.45, normal=paint.bump(cloud - crack * 0.6, 0.5, 0.05))
 
 
-def globe_paint():
-    """Fields of green and gold, as a globe has."""
+def globe_paint(mirror=False):
+    """Fields of green and gold, as a globe has. `mirror`: of polished metal."""
     paint = Paint("globe")
     at = paint.at()
     x, y, z = at.parts()
@@ -78,7 +78,8 @@ def globe_paint():
     cloud = paint.noise(at, 7, 5)
     green = cloud.ramp([(0.35, color("#0b6e4f")), (0.65, color("#31c48d"))])
     gold = cloud.ramp([(0.35, color("#c9a227")), (0.65, color("#ffe08a"))])
-    return paint.surface(paint.mix(golden, green, gold), roughness=cloud * 0.3 + 0.12, metal=golden * 0.75)
+    roughness, metal = (0.08, 1.0) if mirror else (cloud * 0.3 + 0.12, golden * 0.75)
+    return paint.surface(paint.mix(golden, green, gold), roughness=roughness, metal=metal)
 
 
 def bounce(time, bounces, height, radius, phase):
@@ -104,6 +105,10 @@ class Scene:
         sky(strength=0.75)
         sun("key", (38, 12, 35), 2.6, (1.0, 0.95, 0.88), 6)
         lamp("fill", (-3.0, 2.5, 2.5), (0, 0, 0), 2.0, 60, (0.75, 0.85, 1.0))
+        self.place()
+
+    def place(self, mirror=False):
+        """Makes everything but the light. `mirror`: the third ball is one."""
         vertices, faces = box(1.64, 1.64, 0.13, 0.02, 3)
         Mesh("board", vertices + (0, 0, TOP - 0.065), faces, board_paint(), smooth=False, still=True)
         vertices, faces = lathe([(0, TOP), (0.035, TOP), (0.045, TOP + .02), (0.03, TOP + 0.05), (0.05, TOP + .085),
@@ -113,7 +118,7 @@ class Scene:
             Mesh(f"post {number}", vertices + (0.78 * 0.97 * x, 0.78 * 0.97 * y, 0), faces, brass, still=True)
         self.sphere, faces = sphere(112, 56)
         self.balls = [Mesh(f"ball {number}", self.sphere * 0.999, faces, paint)
-                      for number, paint in enumerate((beach_paint(), stone_paint(), globe_paint()))]
+                      for number, paint in enumerate((beach_paint(), stone_paint(), globe_paint(mirror)))]
 
     def move(self, time):
         """Sets everything that moves to a time from 0 to 1."""

@@ -215,6 +215,10 @@ class Scene:
         lamp("fill", (-2.5, -3.0, 1.5), (0, 0, 0), 2.0, 60, (0.85, 0.9, 1.0))
         vertices, faces = lathe([(0, FLOOR - .07), (0.70, FLOOR - .07), (0.73, FLOOR - .06), (0.735, FLOOR - .012), (0.72, FLOOR), (0, FLOOR)], 96)
         Mesh("stage", vertices, faces, stage_paint(), smooth=False, still=True)
+        self.place()
+
+    def place(self):
+        """Makes the dancer, at time 0."""
         self.skeleton = Skeleton(BONES)
         self.body, faces = grown(body, (-.85, -.26, -1.12), (.85, .2, .72), 0.012)
         self.weights = self.skeleton.weights(self.body, 0.28)

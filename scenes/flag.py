@@ -162,6 +162,10 @@ class Scene:
         sky((0.7, 0.83, 1.0), (0.36, 0.33, 0.26), 0.8)
         sun("key", (40, 15, 60), 2.6, (1.0, 0.95, 0.86), 6)
         lamp("fill", (-1.5, -3.2, 1.6), (0, 0, 0), 2.0, 70, (0.9, 0.93, 1.0))
+        self.place()
+
+    def place(self):
+        """Makes everything but the light."""
         vertices, faces = lathe([(0, BASE - .09), (0.90, BASE - .09), (0.985, BASE - .06), (1.0, BASE - .012), (0.985, BASE), (0, BASE)], 128)
         Mesh("ground", vertices, faces, ground_paint(), smooth=False, still=True)
         vertices, faces = lathe([(0, BASE), (.085, BASE), (.08, BASE + .05), (.03, BASE + .07), (.022, BASE + .1), (.020, 1.0),

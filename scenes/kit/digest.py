@@ -19,12 +19,14 @@ def of(folder):
     return hashlib.sha256("".join(lines).encode()).hexdigest()
 
 
-def compared(name, size, digest):
-    """A sentence about the digest of a scene that was just rendered."""
+def compared(name, usual, digest):
+    """A sentence about the digest of a scene that was just rendered. `usual`: with the size and the length that it has without options."""
     known = tomllib.loads(KNOWN.read_text())
     expected = known["scenes"].get(name, {})
-    if size != known["size"] or "digest" not in expected:
-        return f"sha256 {digest}; scenes/digests.toml has none of {name} at {size} pixels"
+    if not usual:
+        return f"sha256 {digest}; scenes/digests.toml has digests without --size and --frames only"
+    if "digest" not in expected:
+        return f"sha256 {digest}; scenes/digests.toml has none of {name}"
     if digest == expected["digest"]:
         return f"sha256 {digest}, as in scenes/digests.toml"
     return (f"sha256 {digest}; scenes/digests.toml has another one, of Blender {known['blender']} on {known['processor']} "

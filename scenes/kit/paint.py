@@ -16,7 +16,7 @@ class Value:
         self.paint, self.socket = paint, socket
 
     def _with(self, operation, *others):
-        kind = "ShaderNodeVectorMath" if self.socket.type == "VECTOR" else "ShaderNodeMath"
+        kind = "ShaderNodeVectorMath" if self.socket.type in ("VECTOR", "RGBA") else "ShaderNodeMath"
         node = self.paint.node(kind, operation=operation)
         for socket, value in zip(node.inputs, (self, *others)):
             if kind == "ShaderNodeVectorMath" and isinstance(value, (int, float)):
@@ -157,13 +157,13 @@ class Paint:
             self.set(socket, value)
         return Value(self, node.outputs[0])
 
-    def noise(self, at, scale=5.0, detail=4.0, roughness=0.5, distortion=0.0):
-        """Clouds, from 0 to 1, around 0.5."""
+    def noise(self, at, scale=5.0, detail=4.0, roughness=0.5, distortion=0.0, three=False):
+        """Clouds, from 0 to 1, around 0.5. `three`: three such numbers, which differ, as a color."""
         node = self.node("ShaderNodeTexNoise")
         self.set(node.inputs["Vector"], at)
         for name, value in (("Scale", scale), ("Detail", detail), ("Roughness", roughness), ("Distortion", distortion)):
             node.inputs[name].default_value = value
-        return Value(self, node.outputs[0])
+        return Value(self, node.outputs["Color" if three else 0])
 
     def cells(self, at, scale=5.0, edges=False, randomness=1.0):
         """The distance from the middle of the nearest cell; with `edges`, from the border between two."""
@@ -172,6 +172,13 @@ class Paint:
         node.inputs["Scale"].default_value = scale
         node.inputs["Randomness"].default_value = randomness
         return Value(self, node.outputs["Distance"])
+
+    def cell_colors(self, at, scale=5.0):
+        """A color for each cell, drawn at random."""
+        node = self.node("ShaderNodeTexVoronoi", feature="F1")
+        self.set(node.inputs["Vector"], at)
+        node.inputs["Scale"].default_value = scale
+        return Value(self, node.outputs["Color"])
 
     def bands(self, at, scale=5.0, distortion=0.0, detail=2.0, direction="X", detail_scale=1.0):
         """Waves across a direction, as in wood."""
@@ -243,10 +250,10 @@ def plain(name, base, roughness=0.5, metal=0.0, coat=0.0):
     return Paint(name).surface(color(base), roughness, metal, coat=coat)
 
 
-def clouded(name, dark, light, scale, roughness=0.4, metal=0.0, coat=0.0):
+def clouded(name, dark, light, scale, roughness=0.4, metal=0.0, coat=0.0, distortion=0.5):
     """From one color to another in clouds: stone, wood, worn metal."""
     paint = Paint(name)
-    shade = paint.noise(paint.at(), scale, 5, 0.6, 0.5)
+    shade = paint.noise(paint.at(), scale, 5, 0.6, distortion)
     return paint.surface(shade.ramp([(0.3, color(dark)), (0.7, color(light))]), roughness, metal, coat=coat)
 
 

@@ -27,6 +27,15 @@ def grid_faces(rows, columns, wrap_rows=False, wrap_columns=False):
     return faces
 
 
+def rectangle(corner, first, second, rows, columns):
+    """A grid of vertices from a corner along two sides, its faces, and where each vertex lies along the sides, from the corner."""
+    corner, first, second = (np.array(vector, float) for vector in (corner, first, second))
+    along, across = np.meshgrid(np.linspace(0, 1, rows), np.linspace(0, 1, columns), indexing="ij")
+    vertices = corner + along[..., None] * first + across[..., None] * second
+    lengths = np.stack([along * np.linalg.norm(first), across * np.linalg.norm(second), 0 * along], -1)
+    return vertices.reshape(-1, 3), grid_faces(rows, columns), lengths.reshape(-1, 3)
+
+
 def sphere(around=96, down=48):
     """The unit sphere, with one vertex at each pole."""
     vertices = [(0, 0, 1)]

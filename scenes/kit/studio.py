@@ -17,18 +17,18 @@ def empty_scene():
     return scene
 
 
-def use_cycles(size, samples, threads=1):
-    """Path tracing on the CPU, of square pictures with a transparent background.
+def use_cycles(width, height, samples, threads=1, transparent=True):
+    """Path tracing on the CPU. `transparent`: pictures have no background where nothing is seen.
 
     Few samples and a denoiser, and few bounces: a picture takes seconds of a core.
     """
     scene = bpy.context.scene
     render = scene.render
     render.engine = "CYCLES"
-    render.resolution_x, render.resolution_y, render.resolution_percentage = size, size, 100
-    render.film_transparent = True
+    render.resolution_x, render.resolution_y, render.resolution_percentage = width, height, 100
+    render.film_transparent = transparent
     render.image_settings.file_format = "PNG"
-    render.image_settings.color_mode = "RGBA"
+    render.image_settings.color_mode = "RGBA" if transparent else "RGB"
     render.image_settings.color_depth = "8"
     render.use_persistent_data = True
     render.threads_mode = "FIXED"
@@ -61,13 +61,14 @@ def use_cycles(size, samples, threads=1):
     cycles.denoising_prefilter = "NONE"
 
 
-def quick_bounces():
+def quick_bounces(quick_denoiser=True):
     """Ambient occlusion in place of all bounces but the first, and a quicker denoiser: half the time, for scenes without mirrors."""
     cycles = bpy.context.scene.cycles
     cycles.use_fast_gi = True
     cycles.fast_gi_method = "REPLACE"
     cycles.ao_bounces_render = 1
-    cycles.denoising_quality = "BALANCED"
+    if quick_denoiser:
+        cycles.denoising_quality = "BALANCED"
 
 
 def sun(name, degrees, strength, color=(1, 1, 1), softness=6):
