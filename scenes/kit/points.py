@@ -9,7 +9,7 @@ from PIL import Image
 
 # As 4DGaussians calls it.
 FILE = "points3D_downsample2.ply"
-# Samples of what moves, of things that stand, and of the large surfaces around them; so many that enough are seen.
+# Samples of what moves, of things that stand, and of the large surfaces around them. Most of them are hidden from the cameras, so these are more than the cloud keeps.
 MOVING, STANDING, AROUND = 9000, 9000, 14000
 # What a cloud keeps of them: all, and those that move among them.
 KEPT, KEPT_MOVING = 5000, 1800

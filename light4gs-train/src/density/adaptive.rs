@@ -35,8 +35,8 @@ keys! {
         grad_threshold_coarse: f32 = 2e-4; THRESHOLD, "3DGS";
         /// Threshold at the start of the fine stage: a Gaussian with a larger screen-space gradient is cloned or split.
         grad_threshold_fine_init: f32 = 2e-4; THRESHOLD, "reference";
-        /// Threshold at the iteration `until` of the fine stage: a Gaussian with a larger screen-space gradient is cloned or split.
-        /// Up to this iteration, the threshold changes linearly from `grad_threshold_fine_init`.
+        /// Threshold at the iteration `until` of the fine stage: a Gaussian with a larger screen-space gradient is
+        /// cloned or split. Up to this iteration, the threshold changes linearly from `grad_threshold_fine_init`.
         grad_threshold_fine_final: f32 = 2e-4; THRESHOLD, "reference";
         /// Gaussians whose largest scale is at most this share of the scene's extent are cloned, and larger ones are
         /// split in two.
@@ -48,8 +48,8 @@ keys! {
         opacity_threshold: f32 = 0.005; SHARE, "3DGS";
         /// Threshold at the start of the fine stage: a Gaussian with a lower opacity counts as faint and is removed.
         opacity_threshold_fine_init: f32 = 0.005; SHARE, "reference";
-        /// Threshold at the iteration `until` of the fine stage: a Gaussian with a lower opacity counts as faint and is removed.
-        /// Up to this iteration, the threshold changes linearly from `opacity_threshold_fine_init`.
+        /// Threshold at the iteration `until` of the fine stage: a Gaussian with a lower opacity counts as faint and
+        /// is removed. Up to this iteration, the threshold changes linearly from `opacity_threshold_fine_init`.
         opacity_threshold_fine_final: f32 = 0.005; SHARE, "reference";
         /// The removal of faint Gaussians starts after this iteration.
         prune_from: usize = 500; ITERATION, "reference";
