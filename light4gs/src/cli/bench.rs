@@ -21,7 +21,7 @@ pub(super) struct Bench {
     /// Back ends, separated by commas.
     #[arg(long, value_delimiter = ',', default_value = "ndarray,flex")]
     device: Vec<DeviceName>,
-    /// A scene file, which is timed instead of generated scenes (layout: docs/benchmarks.md).
+    /// A scene file, which is timed in place of generated scenes; docs/benchmarks.md says what it holds.
     #[arg(long, value_name = "FILE.safetensors", conflicts_with_all = ["gaussians", "size"])]
     scene: Vec<PathBuf>,
     /// Numbers of Gaussians of the generated scenes, separated by commas.

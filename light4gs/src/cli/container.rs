@@ -48,12 +48,12 @@ pub(super) struct Encode {
     /// that were learned in training are not used.
     #[arg(long = "set", value_name = "KEY=VALUE")]
     overrides: Vec<String>,
-    /// Upper bound of the file in bytes, such as 300k or 2M; the file comes close to it. This option adapts the
-    /// quantization steps of attributes.
+    /// Upper bound of the file's size in bytes, such as 300k or 2M; the size comes close to this bound. This option
+    /// adapts the quantization steps of attributes.
     #[arg(long, value_name = "NUMBER", value_parser = bytes)]
     target_bytes: Option<usize>,
-    /// Lower bound of the PSNR of the decoded file on the test views, dB: the smallest file above the bound is written.
-    /// If no file reaches the bound, the best file is written, and the exit code is 2.
+    /// Lower bound of the PSNR of the decoded file on the test views, dB: the smallest file that reaches the bound is
+    /// written. If no file reaches the bound, the best file is written, and the exit code is 2.
     #[arg(long, value_name = "NUMBER", value_parser = decibels, conflicts_with = "target_bytes")]
     target_db: Option<f64>,
     /// Number of layers of Gaussians, the most significant Gaussians first. With several layers, such as 4, a player

@@ -113,8 +113,8 @@ enum Command {
     /// One task of a study, as its launcher starts it.
     #[command(hide = true)]
     StudyTask(study::StudyTask),
-    /// Write the file of a take from the segments that are finished. So the first half of a take plays while the second
-    /// half is in training.
+    /// Write the file of a take from the segments that are finished. So you can play the first half of a take while the
+    /// second half is in training.
     #[command(after_help = "Example:\n  light4gs join runs/walk")]
     Join(take::Join),
     /// Train what was filmed after the end of a take. The base and the segments of the take stay as they are.
@@ -128,7 +128,7 @@ enum Command {
     /// Print what differs between runs: program and machine, configuration, results.
     #[command(after_help = "Example:\n  light4gs compare runs/one runs/other")]
     Compare(compare::Compare),
-    /// Print what an issue should say: version, machine, devices, last error. The text contains none of your paths or
+    /// Print what a bug report needs: version, machine, devices, last error. The text contains none of your paths or
     /// names.
     #[command(after_help = "Example:\n  light4gs report")]
     Report(report::Report),

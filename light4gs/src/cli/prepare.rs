@@ -16,7 +16,7 @@ pub(super) struct Prepare {
     /// One video of a moving camera, or the videos of several cameras that were started together.
     #[arg(required = true, value_name = "VIDEO")]
     videos: Vec<PathBuf>,
-    /// Folder to make. A folder that was begun with the same videos and options is continued.
+    /// Folder to make. If the folder was begun with the same videos and options, `prepare` continues it.
     #[arg(long)]
     out: PathBuf,
     /// Frames to take from each video, spread evenly over it.
@@ -25,7 +25,8 @@ pub(super) struct Prepare {
     /// Wider frames are scaled down to this width, in pixels.
     #[arg(long, default_value_t = 1600, value_name = "PIXELS")]
     max_width: u32,
-    /// Find a pose for every frame, for a rig whose cameras move. By default, each camera gets one pose.
+    /// Find a pose for every frame, for a rig whose cameras move. By default, the cameras of a rig are assumed to stand
+    /// still, and each camera gets one pose.
     #[arg(long)]
     moving: bool,
     /// Show no progress.

@@ -37,13 +37,13 @@ pub(super) struct Wishes {
     /// the machine, which is measured before the start.
     #[arg(long, value_name = "NUMBER", value_parser = minutes)]
     minutes: Option<f64>,
-    /// Upper bound of the file in bytes, such as 300k or 2M; the file comes close to it. This option adapts the number
-    /// of Gaussians, and the weight of a byte in the loss.
+    /// Upper bound of the file's size in bytes, such as 300k or 2M; the size comes close to this bound. This option
+    /// adapts the number of Gaussians, and the weight of a byte in the loss.
     #[arg(long, value_name = "NUMBER", value_parser = bytes)]
     target_bytes: Option<usize>,
-    /// Lower bound of the PSNR of the decoded file on the test views, dB; the file comes close to it. In the last part
-    /// of training, this option adapts the weight of a byte in the loss. If the run misses the bound, it is kept, and
-    /// the exit code is 2.
+    /// Lower bound of the PSNR of the decoded file on the test views, dB; the PSNR comes close to this bound. In the
+    /// last part of training, this option adapts the weight of a byte in the loss. A run that misses the bound is kept,
+    /// and the exit code is 2.
     #[arg(long, value_name = "NUMBER", value_parser = decibels, conflicts_with = "target_bytes")]
     target_db: Option<f64>,
 }

@@ -54,16 +54,16 @@ pub(super) struct Export {
     /// time (--at) or the base alone (--base). With --to glb, each segment of a take gets a .glb.
     #[arg(long, required_unless_present_any = ["html", "site"])]
     out: Option<PathBuf>,
-    /// Kind of the files in the folder. With ply, there is a file for each frame. With glb, for takes only, there is a
-    /// file for each segment, with the segment's motion and what stands still around it. With glb there are also
-    /// `base.glb`, with what stands still over the whole take, and `segments.json`, with the times of each segment.
+    /// Kind of the files in the folder. `ply` writes a file for each frame. `glb`, for takes only, writes a file for
+    /// each segment, with the segment's motion and what stands still around it. `glb` also writes `base.glb`, with what
+    /// stands still over the whole take, and `segments.json`, with the times of each segment.
     #[arg(long, value_enum, value_name = "KIND", default_value = "ply")]
     to: FolderOf,
     /// A single time of a take in seconds, for a .ply or .glb file.
     #[arg(long, value_name = "SECONDS", allow_negative_numbers = true, conflicts_with_all = ["frames", "fps", "time"])]
     at: Option<f64>,
-    /// Write only what stands still over the whole take, for a .ply or .glb file. The first bytes of the take's file
-    /// are enough for this, since they hold its index and its base.
+    /// Write only what stands still over the whole take, for a .ply or .glb file. The beginning of the take's file is
+    /// enough for this, since it holds the index and the base.
     #[arg(long, conflicts_with_all = ["frames", "fps", "time", "at"])]
     base: bool,
     /// A page that plays the scene in a browser without any other file.
@@ -73,7 +73,7 @@ pub(super) struct Export {
     /// previews of the page's link.
     #[arg(long, value_name = "DIR", conflicts_with_all = ["html", "out", "frames", "device", "time", "fps", "z_up", "limits", "at", "base"])]
     site: Option<PathBuf>,
-    /// The address at which the folder of --site will be. Previews of links need this address.
+    /// The address at which the folder of --site will be. Previews of links need this address to show the picture.
     #[arg(long, value_name = "ADDRESS", requires = "site")]
     url: Option<String>,
     /// The title of the page, and of previews of the page's link; by default the name stored in the file.
@@ -82,8 +82,8 @@ pub(super) struct Export {
     /// Dataset whose cameras the page offers; by default the dataset of the run whose folder holds the file.
     #[arg(long, conflicts_with = "out")]
     scene: Option<PathBuf>,
-    /// Number of frames from time 0 to time 1; in a .glb, number of keyframes. By default, as many frames as the file
-    /// was made from.
+    /// Number of frames from time 0 to time 1; in a .glb, number of keyframes. By default, the number of frames that
+    /// the file records.
     #[arg(long, value_parser = clap::value_parser!(u32).range(1..=i64::from(MOST_FRAMES)), allow_negative_numbers = true)]
     frames: Option<u32>,
     /// A single time, in [0, 1], for a .ply or .glb file. An output that can hold only one time gets time 0 by default.
@@ -93,7 +93,7 @@ pub(super) struct Export {
     /// rate, or 30 if it is not known.
     #[arg(long, allow_negative_numbers = true)]
     fps: Option<f32>,
-    /// For a .glb: the scene's z axis points up, as in Blender. The file is turned, since glTF's y axis points up.
+    /// For a .glb of a scene whose z axis points up, as in Blender: the scene is turned, since glTF's y axis points up.
     #[arg(long)]
     z_up: bool,
     /// Back end: auto (a graphics card if there is one), flex or ndarray (both on the processor), wgpu, or wgpu with an adapter

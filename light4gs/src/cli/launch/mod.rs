@@ -21,14 +21,14 @@ const PAUSE: Duration = Duration::from_millis(500);
 pub(super) enum Launcher {
     /// Processes on this machine.
     Local,
-    /// A job array on a Slurm cluster; the command returns when the job array is submitted.
+    /// A job array on a Slurm cluster; the command returns as soon as the job array is submitted.
     Slurm,
 }
 
 /// How tasks are started.
 #[derive(Debug, Args)]
 pub(super) struct LaunchOptions {
-    /// Where the tasks run: the runs of a study, or the base and the segments of a take.
+    /// Where the tasks run. A task trains a run of a study, or the base or a segment of a take.
     #[arg(long, value_enum, default_value = "local")]
     pub(super) launcher: Launcher,
     /// Number of tasks (see --launcher) that run at the same time.

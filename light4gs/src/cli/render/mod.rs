@@ -40,7 +40,7 @@ pub(super) struct Render {
     /// Camera path.
     #[arg(long, value_enum, default_value = "orbit")]
     path: Path,
-    /// Render the test views of this dataset instead of a path.
+    /// Render the test views of this dataset, not a camera path.
     #[arg(long, conflicts_with = "path")]
     scene: Option<PathBuf>,
     /// Number of frames.

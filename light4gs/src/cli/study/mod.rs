@@ -69,13 +69,13 @@ pub(super) struct Study {
     /// and standard deviations.
     #[arg(long, default_value_t = 1, value_parser = clap::value_parser!(u64).range(1..=1000))]
     seeds: u64,
-    /// Folder of another study. If a finished run of that study trained just as a run of this study would, this
-    /// training is reused, not repeated. This option may be given more than once.
+    /// Folder of another study. If a run of this study would repeat the training of a finished run of that study, that
+    /// training is reused. This option may be given more than once.
     #[arg(long, value_name = "STUDY")]
     reuse: Vec<PathBuf>,
     /// Train only the runs that have these parts, such as 400,small,seed-0, in their names SCENE/VALUE+VALUE/seed-K. If
     /// several scenes are given, a run needs only one of them; the same holds for several values of one axis and for
-    /// several seeds. Runs without the parts stay missing.
+    /// several seeds. All other runs stay missing.
     #[arg(long, value_delimiter = ',', value_name = "PART")]
     only: Vec<String>,
     /// Print the runs, without training.
