@@ -53,7 +53,7 @@ use light4gs_keys::{choice, keys};
 choice! {
     /// A part of a [`ContextModel`]. An ablation leaves some out.
     pub enum ContextPart: "part" {
-        /// A transmitted latent for planes that no context from other planes describes.
+        /// A latent, which is stored in the file, for the planes that are not predicted from other planes.
         Hyperprior = "hyperprior",
         /// Anchors are coded first, then the other positions with the anchors as context.
         Checkerboard = "checkerboard",
@@ -61,7 +61,7 @@ choice! {
         InterPlane = "inter_plane",
         /// Higher scales are predicted from the scale below.
         InterScale = "inter_scale",
-        /// As in the reference, a transmitted latent for higher scales too, beside the inter-scale context.
+        /// A latent for higher scales too, in addition to the inter-scale context, as in the reference.
         HighScaleHyperprior = "high_scale_hyperprior",
     }
 }

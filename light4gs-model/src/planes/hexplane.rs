@@ -14,14 +14,14 @@ pub const MOST_PLANE_RESOLUTION: usize = 4096;
 keys! {
     /// Sizes of the multiscale hexplane.
     pub struct HexPlaneConfig {
-        /// Number of channels of each plane: it holds this many numbers at each of its points.
+        /// Number of channels of each plane: a plane holds this many numbers at each of its points.
         channels: usize = 32; Whole { least: 1, most: 1024 }, "paper: 32 for D-NeRF, 16 for real scenes";
         /// Resolution of the planes along x, y, z, t, each a multiple of 4, before it is multiplied by `multipliers`.
         resolution: [usize; 4] = [64, 64, 64, 24];
             List { element: &Whole { least: 4, most: MOST_PLANE_RESOLUTION as u64 }, length: Some(4) },
             "paper; its 25 time steps are no multiple of 4";
-        /// Ascending numbers, one for each scale of planes. The spatial resolution of a scale is `resolution` times
-        /// this number; the resolution in time is the same at all scales.
+        /// Ascending numbers, one for each scale of planes. The spatial resolution of a scale is `resolution` times the
+        /// number of this scale; the resolution in time is the same at all scales.
         multipliers: Vec<usize> = vec![1, 2];
             List { element: &Whole { least: 1, most: MOST_PLANE_RESOLUTION as u64 / 4 }, length: None }, "paper";
     }

@@ -16,13 +16,13 @@ keys! {
         profile: FileProfile = FileProfile::Compact;
             FileProfile::BOUNDS,
             "ours; paper";
-        /// Upper bound of the file's size in bytes; the file is hardly smaller than this bound. Training adapts the
-        /// weight of the rate, and the encoder adapts the steps of the attributes. 0 means no bound; then the size
-        /// follows from lambda and the quantization steps.
+        /// Upper bound of the file's size in bytes. The size comes close to this bound. Training adapts the weight of
+        /// the rate, and the encoder adapts the steps of the attributes. 0 means no bound; then the size follows from
+        /// lambda and the quantization steps.
         target_bytes: usize = 0; Whole { least: 0, most: 1_000_000_000_000 }, "ours";
         /// Lower bound of the PSNR of the decoded file on the test views (on the training views if there are none), in
-        /// dB. The file is hardly better than this bound, since the weight of the rate and the quantization steps are
-        /// adapted as with `target_bytes`. 0 means no bound.
+        /// dB. The PSNR comes close to this bound, since the weight of the rate and the quantization steps are adapted
+        /// as with `target_bytes`. 0 means no bound.
         target_db: f64 = 0.0; DECIBELS, "ours";
         /// Number of layers of Gaussians in the file, the most significant Gaussians first. With more than 1 layer, a
         /// player shows a coarse scene after the first few bytes. Each layer has twice as many Gaussians as the layer
@@ -108,7 +108,7 @@ keys! {
 choice! {
     /// The unit of the rate that `compression.rate.lambda` multiplies.
     pub enum RateWeighting: "weighting" {
-        /// Megabytes (10^6 bytes) of the file, so that one lambda trades bytes for distortion.
+        /// Megabytes (10^6 bytes) of the file, so that lambda trades bytes for distortion.
         Megabytes = "megabytes",
         /// Bits per plane symbol plus bits per symbol of the spherical harmonics, as in the paper.
         PerSymbol = "per_symbol",
@@ -136,8 +136,8 @@ keys! {
         /// The steps at the start.
         #[serde(flatten)]
         initial: AdaptiveQuantizationConfig;
-        /// Whether the steps are learned. Learned steps become coarser than at the start where that pays, but never
-        /// finer, since finer steps help only training frames
+        /// Whether the steps are learned. Learned steps can become coarser than the steps at the start, but never
+        /// finer, since finer steps improve only the training frames
         /// ([results](notebook/2026-11-23-hexplane.md#learned-quantization-steps)).
         adaptive: bool = true; Flag, "paper; dropped by the reference";
         /// Iteration of the fine stage from which the steps are learned.

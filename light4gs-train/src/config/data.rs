@@ -88,13 +88,13 @@ keys! {
             WholeOrNone { least: 8, most: 16_384 }, "ours";
         /// Color behind transparent pixels, each channel 0 to 1.
         background: [f32; 3] = [1.0; 3]; List { element: &SHARE, length: Some(3) }, "reference, D-NeRF: white";
-        /// Where the times of images come from, if a dataset in the layout `colmap` or `nerfstudio` has none. `light4gs
-        /// check` prints which of the sources listed here was used.
+        /// Where the times of images come from, if a dataset in the layout `colmap` or `nerfstudio` has no times.
+        /// `light4gs check` prints which of the sources listed here was used.
         times: TimesKind = TimesKind::Auto; TimesKind::BOUNDS, "ours";
         /// How images are grouped into cameras, in the layouts `colmap` and `nerfstudio`.
         cameras: CamerasKind = CamerasKind::Auto; CamerasKind::BOUNDS, "ours";
         /// Whether the times of a rig's camera are shifted if this camera is some frames ahead of the other cameras, or
-        /// behind them. If off, `train` and `check` only report cameras that are ahead or behind.
+        /// behind them. If off, `train` and `check` only report such cameras.
         synchronize: bool = false; Flag, "ours";
         /// Upper bound of the memory for decoded images. Images that do not fit are decoded again, ahead of the
         /// iterations that need them.

@@ -68,11 +68,11 @@ keys! {
     /// run looks at them less often, its learning rates are larger in proportion, but at most three times as large. If
     /// a run looks at them more often, its learning rates are smaller in proportion, but at least a fifth as large.
     pub struct CorrectionRates {
-        /// Poses and times are corrected from this iteration on, since before it there is no scene to compare with.
-        /// Iterations are counted over both stages.
+        /// Poses and times are corrected from this iteration on, since in earlier iterations there is no scene to
+        /// compare the frames with. Iterations are counted over both stages.
         from: usize = 300; ITERATION, "ours";
-        /// Learning rate of the logarithms of exposures' gains at the first training step. The learning rate of
-        /// exposures' offsets, in shares of white, is a quarter of this.
+        /// Learning rate of the logarithms of exposures' gains at the first training step. The offsets of exposures are
+        /// in shares of white, and their learning rate is a quarter of this.
         exposure_init: f64 = 2e-2; CORRECTION_RATE, "ours";
         /// Learning rate of exposures at the end of the run.
         exposure_final: f64 = 2e-4; CORRECTION_RATE, "ours";

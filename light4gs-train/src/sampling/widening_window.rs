@@ -8,9 +8,10 @@ use super::{BatchRequest, FrameSampler, Shuffled};
 use crate::stage::Stage;
 
 keys! {
-    /// Frames of a window of time that widens until it holds all times. So even fast objects move little between the
-    /// times that are already learned and the new ones. A survey (`survey`) shows all times first, so that the field
-    /// finds where objects are. The coarse stage sees the times with which the fine stage begins.
+    /// Frames of a window of time that widens until it holds all times. The window widens slowly, so even fast objects
+    /// move little between the times that are already learned and the new ones. If `survey` is not 0, a survey draws
+    /// frames of all times first, so that the field finds the positions of objects. The coarse stage uses the times
+    /// with which the fine stage begins.
     pub struct WideningWindow {
         /// Length of the survey, as a share of the fine stage. The survey draws frames of all times, and ends when the
         /// first window begins.

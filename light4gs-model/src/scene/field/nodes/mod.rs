@@ -69,7 +69,8 @@ keys! {
     pub struct NodesFieldConfig {
         /// Number of nodes; never more than there are Gaussians.
         count: usize = 32; Whole { least: 1, most: MOST_NODES as u64 }, "ours; SC-GS: 512";
-        /// Number of points of time with training frames from one knot of a trajectory to the next.
+        /// Distance in time from one knot of a trajectory to the next, counted in points of time that have training
+        /// frames.
         times_a_knot: f64 = 4.0; Number { least: 0.1, most: 1e6 }, "ours";
         /// A node's radius at the beginning, as a share of the distance to the nearest other node.
         radius: f64 = 0.6; Number { least: 0.01, most: 100.0 }, "ours";
@@ -82,13 +83,14 @@ keys! {
         /// node.
         stillness_start: f64 = -4.0; Number { least: -30.0, most: 30.0 }, "ours";
         /// Whether every Gaussian learns a lifetime, a bell curve over time by which its opacity is multiplied.
-        /// Lifetimes begin with the iteration at which the sampler's window of time holds all times.
+        /// Lifetimes have no effect before the iteration at which the sampler's window of time holds all times.
         lifetime: bool = false; Flag, "ours";
         /// Length of the affinities, which are learned vectors of Gaussians and of nodes. The inner product of a
         /// Gaussian's and a node's affinity is added to the logit of the skinning weight. So a foot and the floor under
-        /// it need not move together.
+        /// it can follow different nodes.
         affinities: usize = 0; Whole { least: 0, most: MOST_AFFINITIES as u64 }, "after SC-GS";
-        /// Weight of the term that keeps each node where its neighbors expect it (as rigid as possible).
+        /// Weight of the as-rigid-as-possible term of the loss. This term pulls each node to the place that follows
+        /// from the rigid motions of the nodes near it.
         rigidity: f64 = 1.0; WEIGHT, "ours; SC-GS: 1e-4 to 0";
         /// Weight of the squared second differences of trajectories.
         smoothness: f64 = 0.1; WEIGHT, "ours";
