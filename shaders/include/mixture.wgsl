@@ -1,4 +1,4 @@
-// The mixture of logistics of a channel, and the mass of the interval around a value. `light4gs-model/src/ops/mixture_bits/cpu.rs` has the
+// The mixture of logistics of a channel, and the mass of the interval around a value. `light4gs-model/src/ops/attribute_bits/cpu_mixture.rs` has the
 // formulas.
 
 struct Logistic {
@@ -27,7 +27,8 @@ fn one_minus_exponential(x: f32) -> f32 {
     return 1.0 - exponential(-x);
 }
 
-fn mixture_of(channel: u32) -> array<Logistic, COMPONENTS> {
+// For intervals of this width.
+fn mixture_of(channel: u32, width: f32) -> array<Logistic, COMPONENTS> {
     let own = channel * COMPONENTS;
     var largest = weight_logits[own];
     for (var k = 1u; k < COMPONENTS; k++) {
@@ -37,7 +38,7 @@ fn mixture_of(channel: u32) -> array<Logistic, COMPONENTS> {
     var sum = 0.0;
     for (var k = 0u; k < COMPONENTS; k++) {
         let inverse_scale = exp(-log_scales[own + k]);
-        let half_width = 0.5 * widths[channel] * inverse_scale;
+        let half_width = 0.5 * width * inverse_scale;
         let weight = exponential(weight_logits[own + k] - largest);
         sum += weight;
         mixture[k] = Logistic(

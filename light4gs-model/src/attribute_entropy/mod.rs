@@ -18,6 +18,7 @@ use light4gs_codec::attributes::{AttributeSteps, CodingOrder, typical_size};
 use crate::entropy::gaussian_conditional::LIKELIHOOD_BOUND;
 use crate::entropy::logistic_mixture::{LogisticMixture, LogisticMixtureConfig};
 use crate::gpu_error::GpuError;
+use crate::ops::attribute_bits::{AttributeBitsInputs, AttributeChannels, CountedBits, PositionSet, attribute_bits};
 use crate::ops::neighborhoods::{Neighborhoods, neighborhoods};
 use crate::ops::uniform_noise::{NoiseDraw, add_uniform_noise};
 use crate::scene::attributes::{Attribute, MEANS};
@@ -156,41 +157,47 @@ impl AttributeEntropy {
         gaussians.map(&mut Replace { model: self, noisy: noisy.into_iter() })
     }
 
-    /// An estimate of the bits of all attributes of all Gaussians, `[1]`, from some rows: the densities see only these and their
-    /// neighbors, and positions count as uniform in their box. `places` are those of the same Gaussians. Differentiable in
-    /// the Gaussians, the steps, the predictions and the densities.
-    pub fn bits(&self, gaussians: GaussianTensors, places: &GaussianPlaces, rows: &[u32]) -> Tensor<1> {
-        let (positions, channels) = self.bits_of_parts(gaussians, places, Some(rows));
-        positions + channels.sum()
+    /// An estimate of the bits of all Gaussians, from some rows: of the positions, then of each number with a density, `[1 + C]`,
+    /// all times `weight`. The densities see only these rows and their neighbors, and positions count as uniform in their box.
+    /// `places` are those of the same Gaussians. Differentiable in the Gaussians, the steps, the predictions and the densities.
+    ///
+    /// A loss is the sum. On a GPU it is better not to make it: a backward pass from several numbers is that of their sum.
+    pub fn bits(&self, gaussians: GaussianTensors, places: &GaussianPlaces, rows: &[u32], weight: f32) -> Tensor<1> {
+        self.bits_of_parts(gaussians, places, Some(rows), weight)
     }
 
     /// Bits of each attribute, `[A]`, from all rows: of noisy Gaussians in training, of quantized ones in an evaluation.
     /// Differentiable in the same inputs as [`AttributeEntropy::bits`].
     pub fn bits_of_each(&self, gaussians: GaussianTensors) -> Tensor<1> {
         let places = self.places(gaussians.means.clone());
-        let (positions, channels) = self.bits_of_parts(gaussians, &places, None);
-        let mut first = 0;
+        let bits = self.bits_of_parts(gaussians, &places, None, 1.0);
+        let mut first = 1;
         let each = self.attributes.iter().map(|attribute| match has_density(&attribute.name) {
             true => {
                 first += attribute.width;
-                channels.clone().narrow(0, first - attribute.width, attribute.width).sum()
+                bits.clone().narrow(0, first - attribute.width, attribute.width).sum()
             }
-            false => positions.clone(),
+            false => bits.clone().narrow(0, 0, 1),
         });
         Tensor::cat(each.collect(), 0)
     }
 
-    /// Bits of the positions, `[1]`, and of each number with a density, `[C]`.
+    /// Bits of the positions, then of each number with a density, `[1 + C]`, times `weight`.
     fn bits_of_parts(
         &self,
         gaussians: GaussianTensors,
         places: &GaussianPlaces,
         rows: Option<&[u32]>,
-    ) -> (Tensor<1>, Tensor<1>) {
+        weight: f32,
+    ) -> Tensor<1> {
         let count = gaussians.means.dims()[0];
         let GaussianPlaces { order, extent } = places;
-        let coded = order.as_ref().filter(|_| rows.is_none()).map(CodingOrder::position_bits);
-        let positions = self.position_bits(*extent, count, coded);
+        let positions = self.place(&MEANS.name).map(|place| PositionSet {
+            place,
+            extent: *extent,
+            count,
+            coded: order.as_ref().filter(|_| rows.is_none()).map(CodingOrder::position_bits),
+        });
         let all: Vec<u32>;
         let rows = match rows {
             Some(rows) => rows,
@@ -199,13 +206,35 @@ impl AttributeEntropy {
                 &all
             }
         };
-        let share = count as f64 / rows.len().max(1) as f64;
         let chosen = Neighborhoods::new(rows, &neighbors_of(order.as_ref(), rows), count);
-        let residuals = self.prediction.residuals(neighborhoods(self.tables(gaussians), chosen));
-        let widths = self.by_channel(self.log_steps.val().exp());
-        let bits = self.mixture.interval_bits(residuals, widths, LIKELIHOOD_BOUND);
-        let corrections = self.by_channel(untracked(self.corrections.val())).squeeze_dim::<1>(1);
-        (positions, bits * corrections * share)
+        let inputs = AttributeBitsInputs {
+            numbers: neighborhoods(self.tables(gaussians), chosen),
+            prediction: self.prediction.weights.val(),
+            log_steps: self.log_steps.val(),
+            weight_logits: self.mixture.weight_logits.val(),
+            means: self.mixture.means.val(),
+            log_scales: self.mixture.log_scales.val(),
+            factors: untracked(self.corrections.val()),
+        };
+        let counted = CountedBits {
+            attributes: self.channels(),
+            positions,
+            bound: LIKELIHOOD_BOUND,
+            share: (count as f64 / rows.len().max(1) as f64) as f32,
+            weight,
+        };
+        attribute_bits(inputs, counted)
+    }
+
+    /// The attributes that have densities, with their channels.
+    fn channels(&self) -> Vec<AttributeChannels> {
+        let mut first = 0;
+        let attributes = self.attributes.iter().enumerate().filter(|(_, attribute)| has_density(&attribute.name));
+        let channels = attributes.map(|(place, attribute)| {
+            first += attribute.width;
+            AttributeChannels { channels: first - attribute.width..first, place }
+        });
+        channels.collect()
     }
 
     /// Finds neighbors and box of positions `[N, 3]`, on the host, which waits for a GPU.
@@ -230,23 +259,6 @@ impl AttributeEntropy {
             (most - least).max(0.0) / size
         });
         GaussianPlaces { order: CodingOrder::new(means, step).ok(), extent }
-    }
-
-    /// Bits of the positions of `count` Gaussians, `[1]`: `coded`, the bits in a file, if they are given. Otherwise those of
-    /// a set of points that are uniform in their box: the cell of each point, less the order of the points. The derivative
-    /// is always that of the set: half the step takes one bit more for each axis.
-    fn position_bits(&self, extent: [f32; 3], count: usize, coded: Option<u64>) -> Tensor<1> {
-        let log_steps = self.log_steps.val();
-        let Some(place) = self.place(&MEANS.name) else { return Tensor::zeros([1], &log_steps.device()) };
-        let count = count.max(1) as f64;
-        let extent = Tensor::<1>::from_floats(extent, &log_steps.device());
-        let step = log_steps.narrow(0, place, 1).exp();
-        let cells = (extent / step + 1.0).log().sum() * (count * std::f64::consts::LOG2_E);
-        match coded {
-            Some(bits) => cells.clone() - untracked(cells.detach()) + bits as f64,
-            // Stirling's formula for the orders that are not told apart.
-            None => cells - count * (count.log2() - std::f64::consts::LOG2_E),
-        }
     }
 
     /// The steps as the codec takes them, for Gaussians with these logarithms of scales: those of `given` for attributes
@@ -300,9 +312,9 @@ impl AttributeEntropy {
 
     /// Numbers of the attributes, `[A]`, as numbers of their channels, `[C, 1]`.
     fn by_channel(&self, numbers: Tensor<1>) -> Tensor<2> {
-        let attributes = self.attributes.iter().enumerate().filter(|(_, attribute)| has_density(&attribute.name));
-        let places: Vec<i64> =
-            attributes.flat_map(|(place, attribute)| std::iter::repeat_n(place as i64, attribute.width)).collect();
+        let places =
+            self.channels().into_iter().flat_map(|AttributeChannels { channels, place }| channels.map(move |_| place));
+        let places: Vec<i64> = places.map(|place| place as i64).collect();
         let places = Tensor::<1, Int>::from_data(TensorData::from(places.as_slice()), &numbers.device());
         numbers.select(0, places).unsqueeze_dim(1)
     }

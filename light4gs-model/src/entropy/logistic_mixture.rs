@@ -7,7 +7,6 @@ use burn::tensor::activation::softmax;
 use burn::tensor::{Device, Tensor};
 
 use super::factorized_density::{logistic_interval, plain_logistic_interval};
-use crate::ops::mixture_bits::{MixtureInputs, mixture_bits};
 
 /// Configuration of a [`LogisticMixture`].
 #[derive(Config, Debug)]
@@ -68,23 +67,6 @@ impl LogisticMixture {
         let upper = (distance + half) * inverse;
         let weights = softmax(self.weight_logits.val(), 1).unsqueeze_dim::<3>(2);
         (logistic_interval(lower, upper) * weights).sum_dim(1).squeeze_dim(1)
-    }
-
-    /// Bits of each channel `[C]`: of the intervals of `widths [C, 1]` around each of `x [C, N]`. Likelihoods below `bound` are
-    /// raised to it, with the gradient of [`lower_bound`](crate::ops::lower_bound::lower_bound).
-    ///
-    /// # Panics
-    /// If there are more logistics than [`MOST_COMPONENTS`](crate::ops::mixture_bits::MOST_COMPONENTS), or the shapes do
-    /// not belong together.
-    pub fn interval_bits(&self, x: Tensor<2>, widths: Tensor<2>, bound: f32) -> Tensor<1> {
-        let inputs = MixtureInputs {
-            values: x,
-            widths,
-            weight_logits: self.weight_logits.val(),
-            means: self.means.val(),
-            log_scales: self.log_scales.val(),
-        };
-        mixture_bits(inputs, bound)
     }
 
     /// The same densities in float64 on the host.

@@ -29,6 +29,11 @@ impl Kernel {
         Self { shader, team: None, workgroup: WORKGROUP, constants: vec![("WORKGROUP", WORKGROUP)] }
     }
 
+    /// Invocations of a workgroup.
+    pub(crate) fn invocations(&self) -> usize {
+        self.workgroup as usize
+    }
+
     /// Sets the size of the workgroup.
     pub(super) fn workgroup(mut self, workgroup: u32) -> Self {
         self.workgroup = workgroup;

@@ -17,6 +17,7 @@
 
 pub mod activation;
 pub mod adam;
+pub mod attribute_bits;
 pub mod columns;
 pub mod deformation_network;
 pub mod density_likelihood;
@@ -26,7 +27,6 @@ mod host;
 pub mod image_difference;
 pub mod linear;
 pub mod lower_bound;
-pub mod mixture_bits;
 pub mod neighborhoods;
 pub mod node_poses;
 pub mod node_regularizer;
@@ -66,12 +66,12 @@ use crate::gpu::{self, Kernel};
 pub const ON_GPU: &[GpuOperation] = &[
     activation::gpu::OPERATION,
     adam::gpu::OPERATION,
+    attribute_bits::gpu::OPERATION,
     columns::gpu::OPERATION,
     deformation_network::gpu::OPERATION,
     density_likelihood::gpu::OPERATION,
     image_difference::gpu::OPERATION,
     lower_bound::gpu::OPERATION,
-    mixture_bits::gpu::OPERATION,
     neighborhoods::gpu::OPERATION,
     node_poses::gpu::OPERATION,
     node_regularizer::gpu::OPERATION,

@@ -52,7 +52,7 @@ pub fn fit<F: DeformationField, E: EntropyModels>(
             true,
             generator(config.seed, Purpose::Noise, Stage::Fine, iteration).random(),
         );
-        let rate = compression.rate(&noisy, settings.rate.fraction, true, None, &mut random);
+        let rate = compression.rate(&noisy, settings.rate.fraction, true, None, 0.0, &mut random);
         let mut gradients = GradientSums::default();
         let Some(rate) = rate.megabytes() else { break };
         gradients.add_module(&compression, &mut rate.backward());

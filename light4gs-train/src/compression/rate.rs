@@ -62,7 +62,8 @@ pub struct Rate {
     pub planes: Option<Estimate>,
     /// Of all spherical harmonics beyond degree 0, if they have a model of their own and are in the rate.
     pub sh: Option<Estimate>,
-    /// `[1]`: of the other attributes of the Gaussians, if they are in the rate.
+    /// `[1 + C]`: of the other attributes of the Gaussians, if they are in the rate: of the positions, then of each number, times the
+    /// weight that they were asked for with.
     pub attributes: Option<Tensor<1>>,
 }
 
@@ -80,11 +81,6 @@ impl Rate {
     /// `[1]`: megabytes (10^6) of planes and spherical harmonics in the file; `None` if neither is in the rate.
     pub fn megabytes(self) -> Option<Tensor<1>> {
         self.weighted(|_| 1.0 / BITS_A_MEGABYTE)
-    }
-
-    /// `[1]`: megabytes of the other attributes, if they are in the rate.
-    pub fn attribute_megabytes(&self) -> Option<Tensor<1>> {
-        self.attributes.clone().map(|bits| bits / BITS_A_MEGABYTE)
     }
 }
 
@@ -146,12 +142,14 @@ impl<C: PlaneEntropy, S: ShModel> Compression<C, S> {
     /// Estimates the rate on a random share of the planes and of the Gaussians. It is unbiased: over many draws, the
     /// mean is the rate of everything. `places` are those of the noisy positions
     /// ([`light4gs_model::AttributeEntropy::places`]). With `None` they are read here, and the host waits for the GPU.
+    /// A bit of the attributes counts `attribute_weight`.
     pub fn rate<F: DeformationField>(
         &self,
         noisy: &NoisyScene<F>,
         fraction: f64,
         with_gaussians: bool,
         places: Option<GaussianPlaces>,
+        attribute_weight: f32,
         generator: &mut impl Rng,
     ) -> Rate {
         let scene = &noisy.scene;
@@ -188,7 +186,7 @@ impl<C: PlaneEntropy, S: ShModel> Compression<C, S> {
         let attributes = attributes.map(|model| {
             let gaussians = scene.gaussians.tensors();
             let places = places.unwrap_or_else(|| model.places(gaussians.means.clone()));
-            model.bits(gaussians, &places, &rows(count))
+            model.bits(gaussians, &places, &rows(count), attribute_weight)
         });
         Rate { planes: plane_bits, sh, attributes }
     }

@@ -21,7 +21,7 @@ use crate::stage::Stage;
 
 /// The rate of a step, differentiated.
 pub(super) struct RateTerm {
-    /// `[1]`, weighted.
+    /// Numbers whose sum is the weighted rate.
     value: Tensor<1>,
     /// With respect to the noisy scene's parameters and those of the entropy models.
     gradients: GradientSums,
@@ -112,21 +112,25 @@ impl<F: DeformationField, E: EntropyModels> Trainer<F, E> {
         seed_device(&self.device, self.config.seed, Purpose::Latents, Stage::Fine, iteration);
         let apart = (!config.planes || !config.sh).then(|| noisy.with_detached(!config.planes, !config.sh));
         let (noisy_or_apart, places) = (apart.as_ref().unwrap_or(noisy), places.map(Pending::wait));
-        let rate = compression.rate(noisy_or_apart, config.fraction, with_gaussians, places, &mut generator);
+        // Computed once in `interval` iterations and multiplied by that number, so that lambda does not depend on the interval.
         let interval = config.interval as f64;
         let rate_weight = self.state.rate_weight;
-        let attributes = rate.attribute_megabytes();
-        let attributes = attributes.map(|rate| rate * (config.attribute_lambda * interval) * rate_weight);
+        let attribute_weight =
+            rate_weight as f32 * (config.attribute_lambda * interval) as f32 * (1.0 / BITS_A_MEGABYTE as f32);
+        let rate =
+            compression.rate(noisy_or_apart, config.fraction, with_gaussians, places, attribute_weight, &mut generator);
+        let attributes = rate.attributes.clone();
         let modeled = rate.weighted(|part| {
             let weight = match config.weighting {
                 RateWeighting::PerSymbol => config.lambda / part.symbols().max(1) as f64,
-                // Computed once in `interval` iterations and multiplied by that number, so that lambda does not depend
-                // on the interval.
                 RateWeighting::Megabytes => config.lambda * interval / BITS_A_MEGABYTE,
             };
             weight * rate_weight
         });
-        let term = modeled.into_iter().chain(attributes).reduce(|sum, part| sum + part)?;
+        let term = match (modeled, attributes) {
+            (Some(modeled), Some(attributes)) => modeled + attributes.sum(),
+            (modeled, attributes) => modeled.or(attributes)?,
+        };
         let value = term.clone().inner();
         let mut tape = term.backward();
         let steps = noisy.learned_steps().and_then(|steps| steps.steps().grad(&tape));
@@ -138,7 +142,7 @@ impl<F: DeformationField, E: EntropyModels> Trainer<F, E> {
     }
 
     /// Adds the gradients of the rate, where it is due, and the gradients of the steps through the noise. Returns the
-    /// weighted rate, `[1]`. `gradients` are those of the views.
+    /// weighted rate, as numbers to be added up. `gradients` are those of the views.
     pub(super) fn add_rate(
         &self,
         noisy: &NoisyScene<F>,

@@ -26,7 +26,7 @@ struct Differentiated {
     views: Vec<View>,
     /// Of the loss with respect to all parameters.
     gradients: GradientSums,
-    /// The terms of the loss, `[1]` each; at least one.
+    /// Numbers whose sum is the loss.
     loss: Vec<Tensor<1>>,
 }
 

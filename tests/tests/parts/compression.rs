@@ -119,7 +119,7 @@ fn the_rate_on_a_part_is_unbiased() {
     let estimate = |fraction: f64, seed: u64| {
         device.seed(1);
         let mut generator = ChaCha8Rng::seed_from_u64(seed);
-        let rate = compression.rate(&noisy, fraction, true, None, &mut generator);
+        let rate = compression.rate(&noisy, fraction, true, None, 0.0, &mut generator);
         let [planes, sh] = [rate.planes, rate.sh].map(|part| part.unwrap().bits().into_scalar::<f64>());
         (planes, sh)
     };

@@ -1,32 +1,22 @@
-// Derivative of the bits of a channel under its mixture of logistics.
+// Derivative of the bits of a channel: by its residuals, its mixture of logistics, the logarithm of its step.
 //
-// A workgroup owns a channel. Each of its invocations takes every WORKGROUP-th value, writes its gradient, and sums the gradients of
-// the mixture; then each sum is added up over the invocations, in order. A channel has SUMS = 1 + 3 COMPONENTS of them: the width, the
-// logits of the weights, the means, the logarithms of the scales. In `of_mixture` stand the gradients of all widths, then all logits,
-// and so on, each array from its place in `starts`.
+// A workgroup owns a channel. Each of its invocations takes every WORKGROUP-th residual, writes its gradient, and sums the gradients of
+// the mixture; then each sum is added up over the invocations, in order. A channel has SUMS = 1 + 3 COMPONENTS of them: the width of the
+// intervals, the logits of the weights, the means, the logarithms of the scales.
 
-// #include exponential, mixture
-
-struct Parameters {
-    channels: u32,
-    // Values of a channel.
-    count: u32,
-    // Likelihoods below this are raised to it.
-    bound: f32,
-    unused: u32,
-    starts: vec4<u32>,
-}
+// #include exponential, mixture, attributes, attribute_bits
 
 const SUMS: u32 = 1u + 3u * COMPONENTS;
 
-@group(0) @binding(0) var<storage, read_write> values: array<f32>;
-@group(0) @binding(1) var<storage, read_write> widths: array<f32>;
-@group(0) @binding(2) var<storage, read_write> weight_logits: array<f32>;
-@group(0) @binding(3) var<storage, read_write> means: array<f32>;
-@group(0) @binding(4) var<storage, read_write> log_scales: array<f32>;
-@group(0) @binding(5) var<storage, read_write> upstream: array<f32>;
-@group(0) @binding(6) var<storage, read_write> of_values: array<f32>;
-@group(0) @binding(7) var<storage, read_write> of_mixture: array<f32>;
+@group(0) @binding(0) var<storage, read_write> residuals: array<f32>;
+@group(0) @binding(1) var<storage, read_write> log_steps: array<f32>;
+@group(0) @binding(2) var<storage, read_write> factors: array<f32>;
+@group(0) @binding(3) var<storage, read_write> weight_logits: array<f32>;
+@group(0) @binding(4) var<storage, read_write> means: array<f32>;
+@group(0) @binding(5) var<storage, read_write> log_scales: array<f32>;
+@group(0) @binding(6) var<storage, read_write> upstream: array<f32>;
+// Gradients of the residuals, then of the rest.
+@group(0) @binding(7) var<storage, read_write> gradients: array<f32>;
 @group(0) @binding(8) var<uniform> parameters: Parameters;
 
 var<workgroup> partial: array<array<f32, SUMS>, WORKGROUP>;
@@ -41,11 +31,14 @@ fn main(
     if (channel >= parameters.channels) {
         return;
     }
-    var mixture = mixture_of(channel);
-    let slope = -1.44269504 * upstream[channel];
+    let place = attribute_of(channel).z;
+    let width = exp(log_steps[place]);
+    var mixture = mixture_of(channel, width);
+    let slope = -1.44269504 * upstream[1u + channel] * parameters.channel_weight * factors[place];
     var sums: array<f32, SUMS>;
-    for (var i = lane; i < parameters.count; i += WORKGROUP) {
-        let value = values[channel * parameters.count + i];
+    for (var m = lane; m < parameters.count; m += WORKGROUP) {
+        let i = channel * parameters.count + m;
+        let value = residuals[i];
         var masses: array<Mass, COMPONENTS>;
         var likelihood = 0.0;
         for (var k = 0u; k < COMPONENTS; k++) {
@@ -55,19 +48,19 @@ fn main(
         // Below the bound only a step that raises the likelihood counts.
         let counts = likelihood >= parameters.bound || slope < 0.0;
         let by_likelihood = select(0.0, slope / max(likelihood, parameters.bound), counts);
-        var of_value = 0.0;
+        var of_residual = 0.0;
         for (var k = 0u; k < COMPONENTS; k++) {
             let weighted = by_likelihood * mixture[k].weight;
             let by_distance = weighted * masses[k].by_distance;
             let by_half_width = weighted * masses[k].by_half_width;
-            of_value += by_distance * mixture[k].inverse_scale;
+            of_residual += by_distance * mixture[k].inverse_scale;
             sums[0] += 0.5 * by_half_width * mixture[k].inverse_scale;
             sums[1u + k] += weighted * (masses[k].mass - likelihood);
             sums[1u + COMPONENTS + k] -= by_distance * mixture[k].inverse_scale;
             sums[1u + 2u * COMPONENTS + k] -=
                 by_distance * masses[k].distance + by_half_width * mixture[k].half_width;
         }
-        of_values[channel * parameters.count + i] = of_value;
+        gradients[i] = of_residual;
     }
     partial[lane] = sums;
     workgroupBarrier();
@@ -77,11 +70,11 @@ fn main(
             total += partial[k][own];
         }
         if (own == 0u) {
-            of_mixture[parameters.starts.x + channel] = total;
+            gradients[parameters.of_steps + channel] = total * width;
         } else {
             let k = own - 1u;
-            let start = parameters.starts[1u + k / COMPONENTS];
-            of_mixture[start + channel * COMPONENTS + k % COMPONENTS] = total;
+            let start = parameters.mixture_starts[k / COMPONENTS];
+            gradients[start + channel * COMPONENTS + k % COMPONENTS] = total;
         }
     }
 }

@@ -12,38 +12,35 @@
 
 use std::f64::consts::LOG2_E;
 
-use burn::backend::tensor::FloatTensor;
 use light4gs_render::lanes::{LANES, LaneKernel, Lanes, dispatch};
 use rayon::prelude::*;
 
-use super::{INPUTS, MOST_COMPONENTS, MixtureBitsKernels, MixtureTensors};
-use crate::ops::for_cpu_back_ends;
-use crate::ops::host::{HostBackend, HostTensor};
+use super::MOST_COMPONENTS;
 
 type Block = [f32; LANES];
 
 /// The inputs, row by row.
 #[derive(Clone, Copy, Debug)]
-struct MixtureSlices<'a> {
+pub(super) struct MixtureSlices<'a> {
     /// `[C, N]`
-    values: &'a [f32],
+    pub(super) values: &'a [f32],
     /// `[C]`
-    widths: &'a [f32],
+    pub(super) widths: &'a [f32],
     /// `[C, K]`
-    weight_logits: &'a [f32],
+    pub(super) weight_logits: &'a [f32],
     /// `[C, K]`
-    means: &'a [f32],
+    pub(super) means: &'a [f32],
     /// `[C, K]`
-    log_scales: &'a [f32],
+    pub(super) log_scales: &'a [f32],
 }
 
 /// Gradients of [`MixtureSlices`].
-struct MixtureGradients {
-    values: Vec<f32>,
-    widths: Vec<f32>,
-    weight_logits: Vec<f32>,
-    means: Vec<f32>,
-    log_scales: Vec<f32>,
+pub(super) struct MixtureGradients {
+    pub(super) values: Vec<f32>,
+    pub(super) widths: Vec<f32>,
+    pub(super) weight_logits: Vec<f32>,
+    pub(super) means: Vec<f32>,
+    pub(super) log_scales: Vec<f32>,
 }
 
 /// A logistic, and the interval's width as it sees it.
@@ -189,7 +186,7 @@ impl LaneKernel for BitsOfChannel<'_> {
 }
 
 /// Bits of each channel.
-fn bits_of_slices(inputs: &MixtureSlices, bound: f32) -> Vec<f32> {
+pub(super) fn bits_of_slices(inputs: &MixtureSlices, bound: f32) -> Vec<f32> {
     let of_channel = |channel| {
         dispatch(BitsOfChannel { mixture: inputs.mixture(channel), values: inputs.values_of(channel), bound })
     };
@@ -257,7 +254,7 @@ impl LaneKernel for GradientsOfChannel<'_> {
 }
 
 /// Gradients from those of the channels' bits.
-fn mixture_bits_backward(inputs: &MixtureSlices, bound: f32, upstream: &[f32]) -> MixtureGradients {
+pub(super) fn mixture_bits_backward(inputs: &MixtureSlices, bound: f32, upstream: &[f32]) -> MixtureGradients {
     let count = inputs.values.len() / inputs.channels().max(1);
     let mut of_values = vec![0.0; inputs.values.len()];
     let mut sums: Vec<Sums> = of_values
@@ -286,57 +283,5 @@ fn mixture_bits_backward(inputs: &MixtureSlices, bound: f32, upstream: &[f32]) -
         means: all(|sums| &sums.means),
         log_scales: all(|sums| &sums.log_scales),
         values: of_values,
-    }
-}
-
-/// Inputs of the CPU back ends.
-#[derive(Clone, Debug)]
-pub struct CpuInputs {
-    inputs: [HostTensor; INPUTS],
-    bound: f32,
-}
-
-impl CpuInputs {
-    fn slices(&self) -> MixtureSlices<'_> {
-        let [values, widths, weight_logits, means, log_scales] = self.inputs.each_ref().map(HostTensor::as_slice);
-        MixtureSlices { values, widths, weight_logits, means, log_scales }
-    }
-}
-
-fn forward_on_cpu<B: HostBackend>(tensors: MixtureTensors<B>, bound: f32) -> (FloatTensor<B>, CpuInputs) {
-    let inputs = CpuInputs { inputs: tensors.into_array().map(B::to_host), bound };
-    let bits = bits_of_slices(&inputs.slices(), bound);
-    let channels = bits.len();
-    (B::from_values(bits, [channels]), inputs)
-}
-
-fn backward_on_cpu<B: HostBackend>(inputs: &CpuInputs, gradient: FloatTensor<B>) -> MixtureTensors<B> {
-    let upstream = B::to_host(gradient);
-    let channels = upstream.as_slice().len();
-    let gradients = mixture_bits_backward(&inputs.slices(), inputs.bound, upstream.as_slice());
-    let matrix = |values: Vec<f32>| {
-        let columns = values.len() / channels.max(1);
-        B::from_values(values, [channels, columns])
-    };
-    MixtureTensors {
-        values: matrix(gradients.values),
-        widths: matrix(gradients.widths),
-        weight_logits: matrix(gradients.weight_logits),
-        means: matrix(gradients.means),
-        log_scales: matrix(gradients.log_scales),
-    }
-}
-
-for_cpu_back_ends! {
-    MixtureBitsKernels {
-        type Inputs = CpuInputs;
-
-        fn mixture_bits_forward(tensors: MixtureTensors<Self>, bound: f32) -> (FloatTensor<Self>, CpuInputs) {
-            forward_on_cpu(tensors, bound)
-        }
-
-        fn mixture_bits_backward(inputs: CpuInputs, gradient: FloatTensor<Self>) -> MixtureTensors<Self> {
-            backward_on_cpu(&inputs, gradient)
-        }
     }
 }
