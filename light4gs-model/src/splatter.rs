@@ -1,14 +1,11 @@
 //! Differentiable rendering of Gaussians (3DGS, Kerbl et al. 2023).
 
-use std::ops::Range;
-
 use burn::backend::Dispatch;
 use burn::tensor::{Bool, Int, Tensor};
 use light4gs_data::Camera;
 
 use crate::backdrop::Backdrop;
-use crate::ops::columns::columns;
-use crate::ops::splat::{SplatInputs, SplatOps, SplatView};
+use crate::ops::splat::{SplatInputs, SplatOps, SplatOutputs, SplatView};
 use crate::scene::gaussians::{ActivatedGaussians, GaussianTensors};
 
 /// An image, and further results that training needs.
@@ -91,7 +88,15 @@ impl Splatter {
     /// # Panics
     /// If the shapes do not fit together; the message names the tensor.
     pub fn render(&self, gaussians: GaussianTensors, camera: &Camera, screen_offsets: Option<Tensor<2>>) -> Rendering {
-        self.render_activated(gaussians.activated(), camera, screen_offsets)
+        if self.backdrop.is_some() {
+            // Its Gaussians have scales and opacities, not their logarithms.
+            return self.render_activated(gaussians.activated(), camera, screen_offsets);
+        }
+        let GaussianTensors { means, quats, log_scales, opacity_logits, sh_dc, sh_rest, .. } = gaussians;
+        let gaussians =
+            ActivatedGaussians { means, quats, scales: log_scales, opacities: opacity_logits, sh_dc, sh_rest };
+        let (inputs, view) = self.inputs(gaussians, camera, screen_offsets);
+        self.draw(inputs, view.with_logarithms(), None)
     }
 
     /// Renders attributes that are activated already: [`Self::render`] for programs with activations of their own.
@@ -104,22 +109,20 @@ impl Splatter {
         camera: &Camera,
         screen_offsets: Option<Tensor<2>>,
     ) -> Rendering {
-        let own = gaussians.means.dims()[0];
+        let own = self.backdrop.is_some().then_some(gaussians.means.dims()[0]);
         let (inputs, view) = self.inputs(gaussians, camera, screen_offsets);
-        let outputs = Dispatch::splat(inputs, view);
-        let rendering = Tensor::<1>::from_dispatch(outputs.rendering);
-        let [radii, intersections] = [outputs.radii, outputs.intersections].map(Tensor::<1, Int>::from_dispatch);
-        let radii = if self.backdrop.is_some() { radii.narrow(0, 0, own) } else { radii };
-        let (width, height) = (camera.width as usize, camera.height as usize);
-        let pixels = width * height;
-        // Channel by channel: those of all pixels are columns of a matrix with one row.
-        let rendering = rendering.reshape([1, 5 * pixels]);
-        let part = |channels: Range<usize>| columns(rendering.clone(), channels.start * pixels..channels.end * pixels);
+        self.draw(inputs, view, own)
+    }
+
+    /// Draws an image. `own`: Gaussians of the call, if others are drawn with them.
+    fn draw(&self, inputs: SplatInputs<Dispatch>, view: SplatView, own: Option<usize>) -> Rendering {
+        let SplatOutputs { image, alpha, depth, radii, intersections } = Dispatch::splat(inputs, view);
+        let [radii, intersections] = [radii, intersections].map(Tensor::<1, Int>::from_dispatch);
         Rendering {
-            image: part(0..3).reshape([height, width, 3]),
-            alpha: part(3..4).reshape([height, width]),
-            depth: part(4..5).reshape([height, width]),
-            radii,
+            image: Tensor::from_dispatch(image),
+            alpha: Tensor::from_dispatch(alpha),
+            depth: Tensor::from_dispatch(depth),
+            radii: own.map_or(radii.clone(), |own| radii.narrow(0, 0, own)),
             intersections,
         }
     }

@@ -1,12 +1,11 @@
-// exp(min(x, largest)), which is finite.
+// exp(min(x, MAX_LOGARITHM)), which is finite.
 //
 // Each invocation computes one value. It reads `places` and writes `values`.
 
-// #include exponential
+// #include exponential, activation
 
 struct Parameters {
     count: u32,
-    largest: f32,
 }
 
 @group(0) @binding(0) var<storage, read_write> places: array<f32>;
@@ -23,7 +22,5 @@ fn main(
     if (i >= parameters.count) {
         return;
     }
-    let x = places[i];
-    // Not the builtin minimum, which may turn NaN into a number.
-    values[i] = exponential(select(x, parameters.largest, x > parameters.largest));
+    values[i] = bounded_exponential(places[i]);
 }

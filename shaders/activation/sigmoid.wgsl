@@ -2,7 +2,7 @@
 //
 // Each invocation computes one value. It reads `places` and writes `values`.
 
-// #include exponential
+// #include exponential, activation
 
 struct Parameters {
     count: u32,
@@ -22,8 +22,5 @@ fn main(
     if (i >= parameters.count) {
         return;
     }
-    let x = places[i];
-    // Of -|x|, where nothing overflows.
-    let small = exponential(-abs(x));
-    values[i] = select(small, 1.0, x >= 0.0) / (1.0 + small);
+    values[i] = sigmoid(places[i]);
 }

@@ -1,12 +1,20 @@
-// Several tensors in one buffer, each where its place begins; or sums of tensors of one length.
+// Sums of tensors side by side in one buffer, each where its place begins. A sum of one tensor is a copy.
 //
-// One invocation owns one number of a place. Tensors that do not exist, and those that are added to an earlier one, have the length 0.
+// One invocation owns one number of the buffer, from `first` on. The tensors lie in up to seven buffers, several in one.
+
+// #include tensors
 
 struct Tensors {
-    // Numbers of the longest one.
-    longest: u32,
-    // Of each tensor: its length, where it begins, and the number of tensors from it on that are added up there.
-    places: array<vec4<u32>, 7>,
+    // Sums.
+    count: u32,
+    // Where the first one begins, and numbers from there on, with the gaps between them.
+    first: u32,
+    total: u32,
+    unused: u32,
+    // Of each sum: where it begins, its length, its first part, its number of parts.
+    places: array<vec4<u32>, MOST_SUMS>,
+    // Of each part: its buffer, and where it begins there.
+    parts: array<vec4<u32>, MOST_PARTS>,
 }
 
 @group(0) @binding(0) var<storage, read_write> a: array<f32>;
@@ -19,15 +27,17 @@ struct Tensors {
 @group(0) @binding(7) var<storage, read_write> packed: array<f32>;
 @group(0) @binding(8) var<uniform> tensors: Tensors;
 
-fn value_at(tensor: u32, i: u32) -> f32 {
-    switch tensor {
-        case 0u: { return a[i]; }
-        case 1u: { return b[i]; }
-        case 2u: { return c[i]; }
-        case 3u: { return d[i]; }
-        case 4u: { return e[i]; }
-        case 5u: { return f[i]; }
-        default: { return g[i]; }
+fn value_at(part: u32, i: u32) -> f32 {
+    let place = tensors.parts[part];
+    let at = place.y + i;
+    switch place.x {
+        case 0u: { return a[at]; }
+        case 1u: { return b[at]; }
+        case 2u: { return c[at]; }
+        case 3u: { return d[at]; }
+        case 4u: { return e[at]; }
+        case 5u: { return f[at]; }
+        default: { return g[at]; }
     }
 }
 
@@ -38,17 +48,17 @@ fn main(
     @builtin(local_invocation_index) lane: u32,
 ) {
     let own = flat_group(group, groups) * WORKGROUP + lane;
-    if (own >= 7u * tensors.longest) {
+    if (own >= tensors.total) {
         return;
     }
-    let tensor = own / tensors.longest;
-    let i = own % tensors.longest;
-    let place = tensors.places[tensor];
-    if (i < place.x) {
-        var sum = value_at(tensor, i);
-        for (var part = 1u; part < place.z; part++) {
-            sum += value_at(tensor + part, i);
+    let at = tensors.first + own;
+    let place = tensors.places[tensor_at(at)];
+    let i = at - place.x;
+    if (i < place.y) {
+        var sum = value_at(place.z, i);
+        for (var part = 1u; part < place.w; part++) {
+            sum += value_at(place.z + part, i);
         }
-        packed[place.y + i] = sum;
+        packed[at] = sum;
     }
 }

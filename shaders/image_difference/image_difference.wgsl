@@ -1,6 +1,6 @@
-// Sums of the absolute differences of two images (SQUARED: of the squared ones).
+// The mean of the absolute differences of two images (SQUARED: of the squared ones), in parts that are to be added up.
 //
-// A workgroup owns a block of BLOCK numbers of `image` and `truth`, and writes its sum to `sums`.
+// A workgroup owns a block of BLOCK numbers of `image` and `truth`, and writes its part to `parts`.
 
 // #include workgroup_sum
 
@@ -10,7 +10,7 @@ struct Parameters {
 
 @group(0) @binding(0) var<storage, read_write> image: array<f32>;
 @group(0) @binding(1) var<storage, read_write> truth: array<f32>;
-@group(0) @binding(2) var<storage, read_write> sums: array<f32>;
+@group(0) @binding(2) var<storage, read_write> parts: array<f32>;
 @group(0) @binding(3) var<uniform> parameters: Parameters;
 
 @compute @workgroup_size(WORKGROUP)
@@ -28,6 +28,6 @@ fn main(
     }
     let total = workgroup_sum(sum, lane);
     if (lane == 0u && block * BLOCK < parameters.count) {
-        sums[block] = total;
+        parts[block] = total / f32(parameters.count);
     }
 }

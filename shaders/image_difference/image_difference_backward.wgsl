@@ -1,6 +1,7 @@
 // Derivative of the mean of absolute differences of two images (SQUARED: of squared ones) by the first.
 //
-// Each invocation computes one number. It reads `image`, `truth` and the mean's gradient `upstream[0]`, and writes `gradients`.
+// Each invocation computes one number. It reads `image`, `truth` and the gradient of its block's part of the mean, `upstream`, and
+// writes `gradients`.
 
 struct Parameters {
     count: u32,
@@ -24,5 +25,5 @@ fn main(
     }
     let difference = image[i] - truth[i];
     let slope = select(sign(difference), 2.0 * difference, SQUARED == 1u);
-    gradients[i] = upstream[0] / f32(parameters.count) * slope;
+    gradients[i] = upstream[i / BLOCK] / f32(parameters.count) * slope;
 }

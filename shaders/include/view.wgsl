@@ -18,4 +18,6 @@ struct View {
     cells: vec4<u32>,
     // Gaussians, active SH degree, coefficients of `sh_rest` for each Gaussian, intersections that there is room for.
     counts: vec4<u32>,
+    // Where alpha and depth begin in an image, behind its color.
+    pixels: vec4<u32>,
 }

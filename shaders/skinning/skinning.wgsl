@@ -1,7 +1,7 @@
 // Linear blend skinning: positions and rotations of the Gaussians after the nodes have moved.
 //
 // One invocation owns one Gaussian and meets all nodes twice: first for the largest exponent, then for the blended pose. Reads
-// Gaussians and nodes. Writes `moved` [N, 7]: position, quaternion. Saves five vectors of `blended` for the backward pass:
+// Gaussians and nodes. Writes to `moved` positions [N, 3] and quaternions [N, 4]. Saves five vectors of `blended` for the backward pass:
 //
 //   0, 1, 2: rows of the blended matrix, each with its component of the blended offset
 //   3: the blended quaternion
@@ -12,6 +12,8 @@
 struct Parameters {
     count: u32,
     nodes: u32,
+    // Where the moved quaternions begin.
+    quats: u32,
 }
 
 @group(0) @binding(0) var<storage, read_write> means: array<f32>;
@@ -69,12 +71,11 @@ fn main(
     let quat = vec4<f32>(quats[4u * i], quats[4u * i + 1u], quats[4u * i + 2u], quats[4u * i + 3u]);
     let position = position_in(pose, mean);
     let turned = hamilton_product(pose.turn, quat);
-    let own = 7u * i;
     for (var k = 0u; k < 3u; k++) {
-        moved[own + k] = position[k];
+        moved[3u * i + k] = position[k];
     }
     for (var k = 0u; k < 4u; k++) {
-        moved[own + 3u + k] = turned[k];
+        moved[parameters.quats + 4u * i + k] = turned[k];
     }
     blended[5u * i] = pose.row_x;
     blended[5u * i + 1u] = pose.row_y;

@@ -5,7 +5,7 @@
 // same order, and less those of the nearest depth they fit into DEPTH_BITS, which is fewer digits to sort: all up to 4e9 times the
 // nearest, beyond which all count as equally far. A Gaussian without cells has the largest key.
 
-// #include arithmetic, view, splat, quaternion, covariance, spherical_harmonics
+// #include exponential, activation, scale_and_opacity, arithmetic, view, splat, quaternion, covariance, spherical_harmonics
 
 @group(0) @binding(0) var<storage, read_write> means: array<f32>;
 @group(0) @binding(1) var<storage, read_write> quats: array<f32>;
@@ -94,10 +94,10 @@ fn main(
         return;
     }
     let mean = vec3<f32>(means[3u * i], means[3u * i + 1u], means[3u * i + 2u]);
-    let scale = vec3<f32>(scales[3u * i], scales[3u * i + 1u], scales[3u * i + 2u]);
+    let scale = scale_of(vec3<f32>(scales[3u * i], scales[3u * i + 1u], scales[3u * i + 2u]));
     let quat = vec4<f32>(quats[4u * i], quats[4u * i + 1u], quats[4u * i + 2u], quats[4u * i + 3u]);
     let screen_offset = vec2<f32>(screen_offsets[2u * i], screen_offsets[2u * i + 1u]);
-    let opacity = opacities[i];
+    let opacity = opacity_of(opacities[i]);
     let color = color_of(i, mean);
     write_vector(i, 2u, color);
     let g = geometry_of(mean, quat, scale);

@@ -6,7 +6,7 @@
 // Every gradient is written once: `gradients` holds those of means [N, 3], quats [N, 4], scales [N, 3], opacities [N],
 // sh_dc [N, 3], sh_rest [N, K, 3] and screen offsets [N, 2], at the places in `places`.
 
-// #include arithmetic, view, quaternion, covariance, spherical_harmonics
+// #include exponential, activation, scale_and_opacity, arithmetic, view, quaternion, covariance, spherical_harmonics
 
 struct Places {
     // means, quats, scales, opacities
@@ -31,6 +31,22 @@ struct Parameters {
 @group(0) @binding(8) var<uniform> parameters: Parameters;
 
 var<private> view: View;
+
+// From the gradient by a scale; 0 where the bound was reached, which BOUND_REACHED has the bits of.
+fn by_place_of_scale(upstream: vec3<f32>, scale: vec3<f32>) -> vec3<f32> {
+    if (LOGARITHMS == 0u) {
+        return upstream;
+    }
+    return select(upstream * scale, vec3<f32>(0.0), scale >= vec3<f32>(bitcast<f32>(BOUND_REACHED)));
+}
+
+// From the gradient by an opacity.
+fn by_place_of_opacity(upstream: f32, opacity: f32) -> f32 {
+    if (LOGARITHMS == 0u) {
+        return upstream;
+    }
+    return upstream * (opacity * (1.0 - opacity));
+}
 
 fn write3(at: u32, value: vec3<f32>) {
     gradients[at] = value.x;
@@ -116,13 +132,13 @@ fn main(
         -conic.y * moments.y - conic.z * moments.z,
     );
     let d_conic = vec3<f32>(-0.5 * moments.w, -moments_y.x, -0.5 * moments_y.y);
-    gradients[parameters.places.a.w + i] = moments.x / opacity;
+    gradients[parameters.places.a.w + i] = by_place_of_opacity(moments.x / opacity, opacity);
     let d_offset = d_position * (0.5 * vec2<f32>(view.size.xy));
     gradients[parameters.places.b.z + 2u * i] = d_offset.x;
     gradients[parameters.places.b.z + 2u * i + 1u] = d_offset.y;
 
     let mean = vec3<f32>(means[3u * i], means[3u * i + 1u], means[3u * i + 2u]);
-    let scale = vec3<f32>(scales[3u * i], scales[3u * i + 1u], scales[3u * i + 2u]);
+    let scale = scale_of(vec3<f32>(scales[3u * i], scales[3u * i + 1u], scales[3u * i + 2u]));
     let raw_quat = vec4<f32>(quats[4u * i], quats[4u * i + 1u], quats[4u * i + 2u], quats[4u * i + 3u]);
     let g = geometry_of(mean, raw_quat, scale);
 
@@ -143,10 +159,9 @@ fn main(
     let d_rs_x = g.row_x * d_factor_x.x + g.row_y * d_factor_y.x;
     let d_rs_y = g.row_x * d_factor_x.y + g.row_y * d_factor_y.y;
     let d_rs_z = g.row_x * d_factor_x.z + g.row_y * d_factor_y.z;
-    write3(
-        parameters.places.a.z + 3u * i,
-        vec3<f32>(dot3(d_rs_x, g.rotation.axis_x), dot3(d_rs_y, g.rotation.axis_y), dot3(d_rs_z, g.rotation.axis_z)),
-    );
+    let d_scale =
+        vec3<f32>(dot3(d_rs_x, g.rotation.axis_x), dot3(d_rs_y, g.rotation.axis_y), dot3(d_rs_z, g.rotation.axis_z));
+    write3(parameters.places.a.z + 3u * i, by_place_of_scale(d_scale, scale));
     let d_quat =
         rotation_backward(g.quat, g.quat_norm, d_rs_x * g.scale.x, d_rs_y * g.scale.y, d_rs_z * g.scale.z);
     for (var k = 0u; k < 4u; k++) {

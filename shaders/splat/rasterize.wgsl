@@ -33,7 +33,6 @@ fn main(
     }
     let own = own_pixels(cell, lane);
     let chunk = chunk_of(team_uniform(starts[cell], lane), team_uniform(starts[cell + 1u], lane));
-    let pixel_count = view.size.x * view.size.y;
     let x = f32(own.x);
 
     // T, negative once the pixel has stopped.
@@ -50,8 +49,8 @@ fn main(
             red[k / 4u][k % 4u] = rendering[3u * at];
             green[k / 4u][k % 4u] = rendering[3u * at + 1u];
             blue[k / 4u][k % 4u] = rendering[3u * at + 2u];
-            transmittance[k / 4u][k % 4u] = rendering[3u * pixel_count + at];
-            depth[k / 4u][k % 4u] = rendering[4u * pixel_count + at];
+            transmittance[k / 4u][k % 4u] = rendering[view.pixels.x + at];
+            depth[k / 4u][k % 4u] = rendering[view.pixels.y + at];
         }
     }
 
@@ -97,8 +96,8 @@ fn main(
             rendering[3u * at] = rgb.x;
             rendering[3u * at + 1u] = rgb.y;
             rendering[3u * at + 2u] = rgb.z;
-            rendering[3u * pixel_count + at] = alpha;
-            rendering[4u * pixel_count + at] = depth[k / 4u][k % 4u];
+            rendering[view.pixels.x + at] = alpha;
+            rendering[view.pixels.y + at] = depth[k / 4u][k % 4u];
         }
     }
 }

@@ -5,7 +5,7 @@
 // finished image, so a running remainder is enough.
 //
 // Teams, cells and pixels are as in `rasterize.wgsl`. Also reads the finished image and `upstream`, its gradient, in
-// the same layout. For each of its intersections it writes ten sums over the cell's pixels, at ten times the
+// the same layout; only that of the color if COLOR_ALONE is 1. For each of its intersections it writes ten sums over the cell's pixels, at ten times the
 // intersection's number: gradients of red, green, blue and depth, then the moments of p = alpha · dS/dalpha: p, p dx, p
 // dy, p dx², p dx dy, p dy². No other invocation writes there, so the sums do not depend on any order. Between two
 // chunks of a list, `carried` holds T and the remainder of every pixel.
@@ -55,7 +55,12 @@ fn main(
         if (in_image(own, k)) {
             let at = pixel_index(own, k);
             let rgb = vec3<f32>(upstream[3u * at], upstream[3u * at + 1u], upstream[3u * at + 2u]);
-            let up_z = upstream[4u * pixel_count + at];
+            var up_alpha = 0.0;
+            var up_z = 0.0;
+            if (COLOR_ALONE == 0u) {
+                up_alpha = upstream[view.pixels.x + at];
+                up_z = upstream[view.pixels.y + at];
+            }
             up_red[quad][place_in_quad] = rgb.x;
             up_green[quad][place_in_quad] = rgb.y;
             up_blue[quad][place_in_quad] = rgb.z;
@@ -67,8 +72,8 @@ fn main(
                 transmittance[quad][place_in_quad] = 1.0;
                 let color = vec3<f32>(rendering[3u * at], rendering[3u * at + 1u], rendering[3u * at + 2u]);
                 // The background's value; alpha is 1 - T, hence the minus.
-                left[quad][place_in_quad] = dot3(color, rgb) + rendering[4u * pixel_count + at] * up_z
-                    - (1.0 - rendering[3u * pixel_count + at]) * upstream[3u * pixel_count + at];
+                left[quad][place_in_quad] = dot3(color, rgb) + rendering[view.pixels.y + at] * up_z
+                    - (1.0 - rendering[view.pixels.x + at]) * up_alpha;
             }
         }
     }

@@ -10,12 +10,19 @@ use super::kernel::Kernel;
 use super::launch::{Launch, same_memory};
 use crate::gpu_error::GpuError;
 
-/// Tensors that one launch of `pack_tensors` takes.
-pub(crate) const PACKED: usize = 7;
+/// Buffers that one launch of `pack_tensors` reads. So a sum never has more parts.
+pub(crate) const PACKED_BUFFERS: usize = 7;
+/// Sums that it makes, and their parts.
+const MOST_SUMS: usize = 64;
+const MOST_PARTS: usize = 128;
 
 /// The kernel of this file.
 pub(super) fn kernels() -> Vec<Kernel> {
-    vec![PACK_TENSORS.into()]
+    vec![packing()]
+}
+
+fn packing() -> Kernel {
+    Kernel::new(PACK_TENSORS).constant("MOST_SUMS", MOST_SUMS as u32).constant("MOST_PARTS", MOST_PARTS as u32)
 }
 
 /// Tensors in one buffer, each at its place.
@@ -42,7 +49,7 @@ impl Arena {
         Self::of_sums(gpu, name, &parts, lengths)
     }
 
-    /// The sums of tensors of these lengths, [`PACKED`] and fewer in each sum, added up in their order.
+    /// The sums of tensors of these lengths, [`PACKED_BUFFERS`] and fewer in each sum, added up in their order.
     pub(crate) fn of_sums(
         gpu: &Gpu,
         name: &'static str,
@@ -52,26 +59,13 @@ impl Arena {
         let arena = Self::new(gpu, name, lengths)?;
         let mut next = 0;
         while next < sums.len() {
-            let (first, mut tensors): (usize, Vec<&Handle>) = (next, Vec::with_capacity(PACKED));
-            let mut places = [[0; 4]; PACKED];
-            while let Some(parts) = sums.get(next).filter(|parts| tensors.len() + parts.len() <= PACKED) {
-                let [length, start] = [lengths[next], arena.places.starts[next]].map(|number| number as u32);
-                places[tensors.len()] = [length, start, parts.len() as u32, 0];
-                tensors.extend(*parts);
+            let first = next;
+            let mut packing = Packing::default();
+            while next < sums.len() && packing.add(sums[next], [arena.places.starts[next], lengths[next]]) {
                 next += 1;
             }
-            assert!(next > first, "no more than {PACKED} tensors are added up at once");
-            let longest = lengths[first..next].iter().copied().max().unwrap_or(0);
-            let mut launch = Launch::new(&gpu.client, PACK_TENSORS);
-            for tensor in &tensors {
-                launch = launch.reads(tensor);
-            }
-            // What is not there is bound as well.
-            for _ in tensors.len()..PACKED {
-                launch = launch.reads(&gpu.allocate("no tensor", 1)?);
-            }
-            let uniform = [&[longest as u32, 0, 0, 0], places.as_flattened()].concat();
-            launch.updates_if(first > 0, &arena.buffer).uniform(&uniform).invocations(PACKED * longest)?;
+            assert!(next > first, "no more than {PACKED_BUFFERS} tensors are added up at once");
+            packing.launch(gpu, &arena.buffer, first > 0)?;
         }
         Ok(arena)
     }
@@ -79,6 +73,70 @@ impl Arena {
     /// Tensor `k`.
     pub(crate) fn tensor(&self, k: usize) -> Handle {
         self.places.of(&self.buffer, k)
+    }
+}
+
+/// What one launch of `pack_tensors` does.
+#[derive(Default)]
+struct Packing {
+    /// In which the tensors lie.
+    buffers: Vec<Handle>,
+    /// Of each sum: where it begins, its length, its first part, its number of parts.
+    places: Vec<[usize; 4]>,
+    /// Of each part: its buffer, and where it begins there.
+    parts: Vec<[usize; 2]>,
+}
+
+impl Packing {
+    /// Adds a sum, which begins in the arena at `start`, unless there is no room for it.
+    fn add(&mut self, tensors: &[Handle], [start, length]: [usize; 2]) -> bool {
+        let buffers = self.buffers.len();
+        let parts: Vec<[usize; 2]> = tensors.iter().map(|tensor| self.place_of(tensor)).collect();
+        let fits = self.buffers.len() <= PACKED_BUFFERS
+            && self.places.len() < MOST_SUMS
+            && self.parts.len() + parts.len() <= MOST_PARTS;
+        if !fits {
+            self.buffers.truncate(buffers);
+            return false;
+        }
+        self.places.push([start, length, self.parts.len(), parts.len()]);
+        self.parts.extend(parts);
+        true
+    }
+
+    /// The buffer of a tensor, whose whole memory is bound, and where it begins there.
+    fn place_of(&mut self, tensor: &Handle) -> [usize; 2] {
+        let buffer = self.buffers.iter().position(|buffer| same_memory(buffer, tensor)).unwrap_or_else(|| {
+            let mut whole = tensor.clone();
+            (whole.offset_start, whole.offset_end) = (None, None);
+            self.buffers.push(whole);
+            self.buffers.len() - 1
+        });
+        [buffer, tensor.offset_start.unwrap_or(0) as usize / 4]
+    }
+
+    /// `later`: some numbers of the arena are there already.
+    fn launch(&self, gpu: &Gpu, arena: &Handle, later: bool) -> Result<(), GpuError> {
+        let Self { buffers, places, parts } = self;
+        let [first, _, ..] = places[0];
+        let total = places.last().map_or(0, |[start, length, ..]| start + length - first);
+        let row = |numbers: &[usize], rows: usize| {
+            let mut words: Vec<u32> = numbers.iter().map(|number| *number as u32).collect();
+            words.resize(4 * rows, 0);
+            words
+        };
+        let parts: Vec<usize> = parts.iter().flat_map(|[buffer, start]| [*buffer, *start, 0, 0]).collect();
+        let uniform =
+            [row(&[places.len(), first, total], 1), row(places.as_flattened(), MOST_SUMS), row(&parts, MOST_PARTS)];
+        let mut launch = Launch::new(&gpu.client, packing());
+        for buffer in buffers {
+            launch = launch.reads(buffer);
+        }
+        // What is not there is bound as well.
+        for _ in buffers.len()..PACKED_BUFFERS {
+            launch = launch.reads(&gpu.allocate("no tensor", 1)?);
+        }
+        launch.updates_if(later, arena).uniform(&uniform.concat()).invocations(total)
     }
 }
 

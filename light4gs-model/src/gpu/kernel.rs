@@ -4,7 +4,7 @@ use std::fmt;
 
 use burn_wgpu::{KernelSource, SourceTemplate};
 use cubecl::prelude::{CubeDim, ExecutionMode, KernelId};
-use light4gs_codec::rendering::{DILATION, MAX_ALPHA, MIN_ALPHA, MIN_TRANSMITTANCE, NEAR, TILE};
+use light4gs_codec::rendering::{DILATION, MAX_ALPHA, MAX_LOGARITHM, MIN_ALPHA, MIN_TRANSMITTANCE, NEAR, TILE};
 use light4gs_render::INVALID_RADIUS;
 use light4gs_shaders::Shader;
 
@@ -95,6 +95,7 @@ fn rendering_constants() -> String {
         ("MIN_ALPHA", MIN_ALPHA),
         ("MAX_ALPHA", MAX_ALPHA),
         ("MIN_TRANSMITTANCE", MIN_TRANSMITTANCE),
+        ("MAX_LOGARITHM", MAX_LOGARITHM),
     ];
     let numbers = numbers.map(|(name, value)| format!("const {name}: f32 = {:?};\n", f64::from(value)));
     let near = NEAR.to_bits();

@@ -16,7 +16,7 @@ pub(crate) mod sort;
 mod subgroups;
 mod team;
 
-pub(crate) use arena::{Arena, PACKED, batches};
+pub(crate) use arena::{Arena, PACKED_BUFFERS, batches};
 #[cfg(test)]
 pub(crate) use context::tests::default_gpu;
 pub(crate) use context::{Gpu, PLACE_ALIGNMENT, Places, buffer_of, first_words};

@@ -47,6 +47,7 @@ pub mod time_means;
 pub mod uniform_noise;
 
 use std::fmt::Debug;
+use std::sync::{Arc, Mutex, PoisonError};
 
 use burn::backend::autodiff::checkpoint::base::Checkpointer;
 use burn::backend::autodiff::checkpoint::strategy::CheckpointStrategy;
@@ -125,6 +126,63 @@ fn recorded<B: Backend, C: CheckpointStrategy, S: Clone + Debug + Send + 'static
         OpsKind::Tracked(prep) => prep.finish(saved, output),
         OpsKind::UnTracked(prep) => prep.finish(output),
     }
+}
+
+/// Makes the gradients of an operation's parents from what it saved and from the gradients of those of its outputs on which the loss
+/// depends.
+type DerivativeOfAll<B, S, const K: usize, const N: usize> = fn(S, [Option<FloatTensor<B>>; K]) -> [FloatTensor<B>; N];
+
+/// Gradients of the outputs of an operation, until its backward pass takes them.
+type Gathered<B, const K: usize> = Arc<Mutex<[Option<FloatTensor<B>>; K]>>;
+
+/// One of several outputs of an operation on the tape: keeps its gradient for the backward pass of the operation.
+#[derive(Debug)]
+struct Gathering<const K: usize>;
+
+impl<B: Backend, const K: usize> Backward<B, 1> for Gathering<K> {
+    type State = (Gathered<B, K>, usize);
+
+    fn backward(self, ops: Ops<Self::State, 1>, tape: &mut Gradients, _: &mut Checkpointer) {
+        let gradient = tape.consume::<B>(&ops.node);
+        let (gathered, output) = ops.state;
+        let mut gathered = gathered.lock().unwrap_or_else(PoisonError::into_inner);
+        let first = gathered.iter().all(Option::is_none);
+        gathered[output] = Some(gradient.clone());
+        let [operation] = ops.parents;
+        // The tape asks for some gradient of the operation; its backward pass reads `gathered` instead.
+        if let Some(operation) = operation.filter(|_| first) {
+            tape.register::<B>(operation.id, gradient);
+        }
+    }
+}
+
+/// [`recorded`] for an operation with several outputs. Burn's tape has one output for each operation, so columns of a common one would
+/// be copies, and their gradients would be put among zeros and added up: on a GPU each is a launch.
+fn recorded_outputs<
+    B: Backend,
+    C: CheckpointStrategy,
+    S: Clone + Debug + Send + 'static,
+    const K: usize,
+    const N: usize,
+>(
+    parents: [NodeGuard; N],
+    (outputs, saved): ([FloatTensor<B>; K], S),
+    derivative: DerivativeOfAll<B, S, K, N>,
+) -> [FloatTensor<Autodiff<B, C>>; K] {
+    let gathered: Gathered<B, K> = Arc::new(Mutex::new(std::array::from_fn(|_| None)));
+    let state = (saved, gathered.clone(), derivative);
+    let operation = recorded::<B, C, _, N>(parents, (outputs[0].clone(), state), |(saved, gathered, derivative), _| {
+        let mut gathered = gathered.lock().unwrap_or_else(PoisonError::into_inner);
+        derivative(saved, gathered.each_mut().map(Option::take))
+    });
+    let mut places = 0..K;
+    outputs.map(|output| {
+        let state = (gathered.clone(), places.next().expect("a place for each output"));
+        match Backward::<B, 1>::prepare::<C>(Gathering::<K>, [operation.node()]).compute_bound().stateful() {
+            OpsKind::Tracked(prep) => prep.finish(state, output),
+            OpsKind::UnTracked(prep) => prep.finish(output),
+        }
+    })
 }
 
 /// Implements a trait with the same items for each CPU back end of this build.

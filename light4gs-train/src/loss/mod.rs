@@ -45,7 +45,7 @@ pub struct LossInput<'a> {
 /// A differentiable measure of the error of a rendered view. Views are differentiated side by side on several threads,
 /// so a loss must be `Sync`; state that it keeps between iterations belongs behind a lock.
 pub trait Loss: Send + Sync {
-    /// `[1]`, on the tape of the rendered tensors.
+    /// Numbers whose sum is the loss, on the tape of the rendered tensors: one, or several where their sum would take time.
     fn loss(&self, view: LossInput) -> Tensor<1>;
 }
 

@@ -15,7 +15,7 @@ mod ssim;
 
 use burn::tensor::{Device, Tensor, TensorData};
 use light4gs_data::{PixelMask, RgbImage8};
-use light4gs_model::ops::image_difference::{Difference, mean_difference};
+use light4gs_model::ops::image_difference::{Difference, mean_difference, mean_difference_in_parts};
 
 pub use metric::{Metric, RegionMetric};
 pub use pixel_map::PixelMap;
@@ -29,6 +29,16 @@ pub fn l1(image: Tensor<3>, truth: Tensor<3>) -> Tensor<1> {
 /// Mean squared difference over pixels and channels, `[1]`. The truth gets no gradient.
 pub fn l2(image: Tensor<3>, truth: Tensor<3>) -> Tensor<1> {
     mean_difference(Difference::Squared, image, truth)
+}
+
+/// [`l1`] in parts that are to be added up, for a loss.
+pub fn l1_in_parts(image: Tensor<3>, truth: Tensor<3>) -> Tensor<1> {
+    mean_difference_in_parts(Difference::Absolute, image, truth)
+}
+
+/// [`l2`] in parts that are to be added up, for a loss.
+pub fn l2_in_parts(image: Tensor<3>, truth: Tensor<3>) -> Tensor<1> {
+    mean_difference_in_parts(Difference::Squared, image, truth)
 }
 
 /// Squared difference at every pixel and channel, `[H, W, 3]`.

@@ -15,7 +15,7 @@ use super::Trainer;
 use super::background::Background;
 use super::list_room::ListRoom;
 use super::profile::Profile;
-use super::views::ViewPools;
+use super::views::{NoOffsets, ViewPools};
 use crate::compression::{Compression, ConfiguredModels, EntropyModels, compression_input};
 use crate::config::Config;
 use crate::corrections::{Corrections, Schedule};
@@ -389,6 +389,7 @@ impl<F: DeformationField, E: EntropyModels> TrainerBuilder<F, E> {
             profile: Profile::off(),
             view_pools,
             list_room: ListRoom::new(!side_by_side),
+            offsets: NoOffsets::default(),
             background: Background::new(!side_by_side),
             lap: None,
             empty_images: EmptyImageWatch::default(),

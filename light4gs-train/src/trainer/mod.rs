@@ -61,7 +61,7 @@ use crate::stage::Stage;
 use background::Background;
 use list_room::ListRoom;
 use profile::Profile;
-use views::ViewPools;
+use views::{NoOffsets, ViewPools};
 
 /// A run in progress.
 ///
@@ -133,6 +133,7 @@ pub struct Trainer<F: DeformationField = BuiltInField, E: EntropyModels = Config
     profile: Profile,
     view_pools: ViewPools,
     list_room: ListRoom,
+    offsets: NoOffsets,
     background: Background,
     lap: Option<Lap>,
     empty_images: EmptyImageWatch,

@@ -1,6 +1,6 @@
 //! The views of a training step. Each has its own tape, so that they can be rendered and differentiated side by side.
 
-use std::sync::Arc;
+use std::sync::{Arc, Mutex, PoisonError};
 
 use burn::module::Module;
 use burn::tensor::{Device, Int, Tensor};
@@ -35,11 +35,27 @@ pub(super) struct ViewPass<'a> {
     pub(super) progress: f64,
     /// Views of an iteration. The loss is their mean.
     pub(super) batch: usize,
+    pub(super) offsets: &'a NoOffsets,
+}
+
+/// Screen offsets of zero, of which only the gradients are wanted. They are kept, since on a GPU zeros are a launch.
+#[derive(Default)]
+pub(super) struct NoOffsets(Mutex<Option<Tensor<2>>>);
+
+impl NoOffsets {
+    /// `[N, 2]`, a leaf of a new tape.
+    fn of(&self, count: usize, device: &Device) -> Tensor<2> {
+        let mut kept = self.0.lock().unwrap_or_else(PoisonError::into_inner);
+        let zeros = kept.take().filter(|zeros| zeros.dims()[0] == count);
+        let zeros = zeros.unwrap_or_else(|| Tensor::zeros([count, 2], &device.clone().inner()));
+        *kept = Some(zeros.clone());
+        Tensor::from_inner(zeros).require_grad()
+    }
 }
 
 /// The results of a view in a step. No tensor is on a tape.
 pub(super) struct View {
-    /// `[1]`: its weighted part of the loss.
+    /// Numbers whose sum is its weighted part of the loss.
     pub(super) loss: Tensor<1>,
     /// Gradients of that part of the loss with respect to the scene's parameters.
     pub(super) gradients: GradientSums,
@@ -92,6 +108,7 @@ impl<F: DeformationField, E: EntropyModels> Trainer<F, E> {
             coarse_to_fine: &self.config.train.coarse_to_fine,
             progress: self.config.train.progress(stage, iteration),
             batch,
+            offsets: &self.offsets,
         }
     }
 }
@@ -165,7 +182,7 @@ impl ViewPass<'_> {
         profile.lap("Gaussians at the time");
         let factor = self.coarse_to_fine.factor(self.progress, &frame.camera);
         seen.camera = seen.camera.reduced(factor);
-        let offsets = Tensor::<2>::zeros([scene.gaussians.len(), 2], self.device).require_grad();
+        let offsets = self.offsets.of(scene.gaussians.len(), self.device);
         let rendering = self.splatter.render(gaussians, &seen.camera, Some(offsets.clone()));
         profile.lap("splatting");
         let mut truth = image_tensor(&reduced(self.images.image(frame)?, factor, RgbImage8::reduced), self.device);

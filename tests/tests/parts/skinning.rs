@@ -4,7 +4,7 @@
 use burn::tensor::activation::softmax;
 use burn::tensor::{Device, Tensor, TensorData};
 use light4gs_model::ops::columns::columns;
-use light4gs_model::ops::skinning::{SkinningInputs, skin};
+use light4gs_model::ops::skinning::{Moved, SkinningInputs, skin};
 use light4gs_tests::golden::{assert_close, assert_close_relative, cpu_devices, devices, values_of};
 use light4gs_tests::random::Random;
 
@@ -184,12 +184,18 @@ fn assert_alike(what: &str, found: &(Vec<f32>, [Vec<f32>; 6]), expected: &(Vec<f
     }
 }
 
+/// Positions and quaternions, `[N, 7]`.
+fn skinned(inputs: SkinningInputs) -> Tensor<2> {
+    let Moved { means, quats } = skin(inputs);
+    Tensor::cat(vec![means, quats], 1)
+}
+
 #[test]
 fn values_and_gradients_are_those_of_plain_operations() {
     for (what, case, weights) in cases() {
         let expected = case.run(&Device::flex(), &weights, plain);
         for (name, device) in devices() {
-            assert_alike(&format!("{name}, {what}"), &case.run(&device, &weights, skin), &expected, &weights);
+            assert_alike(&format!("{name}, {what}"), &case.run(&device, &weights, skinned), &expected, &weights);
         }
     }
 }
@@ -211,7 +217,7 @@ fn where_all_weights_but_one_are_lost() {
             // only have to be finite.
             let expected = case.run(&Device::flex(), &weights, plain);
             for (name, device) in devices() {
-                let found = case.run(&device, &weights, skin);
+                let found = case.run(&device, &weights, skinned);
                 let all = found.1.iter().flatten().chain(&found.0);
                 assert!(all.into_iter().all(|value| value.is_finite()), "{name}, {what}");
                 if place < 1000.0 || stillness > 0.0 {
@@ -260,7 +266,7 @@ fn gradients_against_differences_of_the_twin() {
         let expected = (output, gradients);
         for (name, device) in devices() {
             let what = format!("{name}, {count} Gaussians, {nodes} nodes");
-            assert_alike(&what, &case.run(&device, &weights, skin), &expected, &weights);
+            assert_alike(&what, &case.run(&device, &weights, skinned), &expected, &weights);
         }
     }
 }
@@ -274,7 +280,7 @@ fn the_number_of_threads_changes_no_bit() {
         gradients.into_iter().flatten().chain(output).map(f32::to_bits).collect::<Vec<_>>()
     };
     for (what, case, weights) in cases() {
-        let run = |device: &Device| bits(case.run(device, &weights, skin));
+        let run = |device: &Device| bits(case.run(device, &weights, skinned));
         let expected = pools[0].install(|| run(&Device::flex()));
         for (name, device) in cpu_devices() {
             for pool in &pools {
@@ -289,7 +295,7 @@ fn the_number_of_threads_changes_no_bit() {
 fn a_second_run_gives_the_same_bits() {
     let (what, case, weights) = cases().last().expect("there are cases");
     for (name, device) in devices() {
-        let runs = [(); 2].map(|()| case.run(&device, &weights, skin));
+        let runs = [(); 2].map(|()| case.run(&device, &weights, skinned));
         assert!(runs[0] == runs[1], "{name}, {what}");
     }
 }
@@ -301,7 +307,7 @@ fn tensors_may_lie_in_memory_as_they_like() {
     let case = Case::random(50, 6, 2, &mut random);
     let weights = loss_weights(50, &mut random);
     for (name, device) in devices() {
-        let expected = case.run(&device, &weights, skin);
+        let expected = case.run(&device, &weights, skinned);
         let found = case.run(&device, &weights, |inputs| {
             let SkinningInputs { means, quats, stillness, affinities, nodes, .. } = inputs;
             let affinities = affinities.expect("this case has them");
@@ -310,7 +316,7 @@ fn tensors_may_lie_in_memory_as_they_like() {
             let columns = |first, count| gaussians.clone().narrow(1, first, count);
             let nodes = nodes.narrow(0, 22, 22).transpose();
             let inputs = SkinningInputs::new(columns(3, 3), columns(6, 4), columns(0, 1), nodes);
-            skin(SkinningInputs { affinities: Some(columns(1, 2)), ..inputs })
+            skinned(SkinningInputs { affinities: Some(columns(1, 2)), ..inputs })
         });
         assert!(found == expected, "{name}");
     }
@@ -320,8 +326,8 @@ fn tensors_may_lie_in_memory_as_they_like() {
 fn no_gaussian_is_no_error() {
     let case = Case::random(0, 3, 0, &mut Random::new(350));
     for (name, device) in devices() {
-        let (moved, gradients) = case.run(&device, &[], skin);
-        assert!(moved.is_empty(), "{name}");
+        let (found, gradients) = case.run(&device, &[], skinned);
+        assert!(found.is_empty(), "{name}");
         assert!(gradients.iter().flatten().all(|value| *value == 0.0), "{name}");
         assert_eq!(gradients.map(|values| values.len()), [0, 0, 0, 9, 3, 48], "{name}");
     }
@@ -332,5 +338,5 @@ fn no_gaussian_is_no_error() {
 fn a_wrong_shape_is_named() {
     let mut case = Case::random(5, 3, 0, &mut Random::new(340));
     case.inputs[2].push(1.0);
-    case.run(&Device::flex(), &[0.0; 35], skin);
+    case.run(&Device::flex(), &[0.0; 35], skinned);
 }

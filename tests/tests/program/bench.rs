@@ -64,15 +64,15 @@ fn a_step_does_not_launch_more_kernels_than_before() {
     let adapter = rows[0]["adapter"].as_str().unwrap();
     let more = if adapter.contains("llvmpipe") { 0 } else { 10 };
     for (part, bound) in [
-        ("splat forward + backward", 28),
-        ("skinning forward + backward", 11),
-        ("nodes, training step", 45),
-        ("nodes, step with noise", 51),
-        ("nodes, step with noise and rate", 119),
-        ("nodes, render", 20),
-        ("hexplane, training step", 85),
-        ("hexplane, step with noise", 101),
-        ("hexplane, step with noise and rate", 220),
+        ("splat forward + backward", 23),
+        ("skinning forward + backward", 19),
+        ("nodes, training step", 30),
+        ("nodes, step with noise", 35),
+        ("nodes, step with noise and rate", 41),
+        ("nodes, render", 16),
+        ("hexplane, training step", 71),
+        ("hexplane, step with noise", 82),
+        ("hexplane, step with noise and rate", 197),
     ] {
         let found = launches(part);
         assert!((1..=bound + more).contains(&found), "{part}: {found} launches, {bound} before; {adapter}");

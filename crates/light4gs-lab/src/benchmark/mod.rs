@@ -12,7 +12,7 @@ use std::time::Instant;
 use burn::tensor::{Device, Distribution, Tensor, TensorData};
 use glam::{Mat3, Quat, Vec3};
 use light4gs_data::{Camera, DataError, read_regular_file};
-use light4gs_model::ops::skinning::{SkinningInputs, skin};
+use light4gs_model::ops::skinning::{Moved, SkinningInputs, skin};
 use light4gs_model::{DeformationConfig, GaussianTensors, Gaussians, HexPlaneConfig, ReadBacks, Splatter};
 use light4gs_train::config::DeviceName;
 use light4gs_train::device::adapter_name;
@@ -338,9 +338,12 @@ fn timings(scene: &BenchScene, meter: &Meter, autodiff: &Device) -> Result<Vec<T
     add("hexplane forward + backward", both);
 
     let inputs = skinning_inputs(count, SKINNING_NODES, autodiff);
-    let upstream = Tensor::<2>::random([count, 7], Distribution::Default, autodiff);
+    let [of_means, of_quats] = [3, 4].map(|k| Tensor::<2>::random([count, k], Distribution::Default, autodiff));
     add("skinning forward", meter.measure(|| inputs.clone(), skin));
-    let skinned = |inputs: SkinningInputs| (skin(inputs) * upstream.clone()).sum();
+    let skinned = |inputs: SkinningInputs| {
+        let Moved { means, quats } = skin(inputs);
+        (means * of_means.clone()).sum() + (quats * of_quats.clone()).sum()
+    };
     add("skinning backward", meter.measure(|| skinned(inputs.clone()), |loss| loss.backward()));
     let both = meter.measure(|| inputs.clone(), |inputs| skinned(inputs).backward());
     add("skinning forward + backward", both);

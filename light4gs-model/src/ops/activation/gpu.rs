@@ -4,7 +4,6 @@ use burn::backend::tensor::FloatTensor;
 use burn::tensor::{Device, TensorData};
 use burn_fusion::{Fusion, FusionBackend};
 use burn_wgpu::CubeBackend;
-use light4gs_codec::rendering::MAX_LOGARITHM;
 use light4gs_shaders::{BOUNDED_EXPONENTIAL, BOUNDED_EXPONENTIAL_BACKWARD, SIGMOID, SIGMOID_BACKWARD};
 
 use super::{ActivationKernels, ActivationOps, Curve, bound_reached, bounded_exponential, sigmoid};
@@ -24,7 +23,7 @@ impl ActivationOps for CubeBackend {
     fn activation(curve: Curve, tensor: FloatTensor<Self>) -> FloatTensor<Self> {
         match curve {
             Curve::Sigmoid => elementwise(SIGMOID, [tensor], &[]),
-            Curve::BoundedExponential => elementwise(BOUNDED_EXPONENTIAL, [tensor], &[MAX_LOGARITHM]),
+            Curve::BoundedExponential => elementwise(BOUNDED_EXPONENTIAL, [tensor], &[]),
         }
     }
 }

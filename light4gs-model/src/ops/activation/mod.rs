@@ -23,7 +23,7 @@ pub enum Curve {
 }
 
 /// A bounded exponential from here on has reached its bound. A little below it, since no two compilers have the same last digit.
-fn bound_reached() -> f32 {
+pub(super) fn bound_reached() -> f32 {
     0.999 * MAX_LOGARITHM.exp()
 }
 

@@ -6,7 +6,7 @@ use burn::tensor::Shape;
 use burn::tensor::{Device, TensorData};
 use burn_fusion::{Fusion, FusionBackend};
 use burn_wgpu::{CubeBackend, CubeTensor};
-use light4gs_shaders::{IMAGE_DIFFERENCE, IMAGE_DIFFERENCE_BACKWARD, MEAN_OF_SUMS, Shader};
+use light4gs_shaders::{IMAGE_DIFFERENCE, IMAGE_DIFFERENCE_BACKWARD, Shader};
 
 use super::{Difference, ImageDifferenceKernels, mean_difference};
 use crate::gpu::{Gpu, Kernel, Launch, buffer_of, first_words};
@@ -23,36 +23,27 @@ pub(in crate::ops) const OPERATION: GpuOperation =
 
 /// The kernels of this file.
 fn kernels() -> Vec<Kernel> {
-    let of = |difference| [summing(difference), kernel(IMAGE_DIFFERENCE_BACKWARD, difference)];
-    [Difference::Absolute, Difference::Squared].into_iter().flat_map(of).chain([MEAN_OF_SUMS.into()]).collect()
+    let of = |difference| [IMAGE_DIFFERENCE, IMAGE_DIFFERENCE_BACKWARD].map(|shader| kernel(shader, difference));
+    [Difference::Absolute, Difference::Squared].into_iter().flat_map(of).collect()
 }
 
 fn kernel(shader: Shader, difference: Difference) -> Kernel {
-    Kernel::new(shader).constant("SQUARED", (difference == Difference::Squared).into())
-}
-
-fn summing(difference: Difference) -> Kernel {
-    kernel(IMAGE_DIFFERENCE, difference).constant("BLOCK", BLOCK as u32)
+    let squared = difference == Difference::Squared;
+    Kernel::new(shader).constant("SQUARED", squared.into()).constant("BLOCK", BLOCK as u32)
 }
 
 fn forward(difference: Difference, image: CubeTensor, truth: CubeTensor) -> Result<CubeTensor, GpuError> {
     let gpu = Gpu::of(&image)?;
     let count = image.shape().num_elements();
     let blocks = count.div_ceil(BLOCK);
-    let sums = gpu.allocate("sums of differences", blocks)?;
-    let mean = gpu.allocate("mean difference", 1)?;
-    Launch::new(&gpu.client, summing(difference))
+    let parts = gpu.allocate("parts of a mean difference", blocks)?;
+    Launch::new(&gpu.client, kernel(IMAGE_DIFFERENCE, difference))
         .reads(&buffer_of(image))
         .reads(&buffer_of(truth))
-        .writes(&sums)
+        .writes(&parts)
         .uniform(&[count as u32])
         .groups(blocks)?;
-    Launch::new(&gpu.client, MEAN_OF_SUMS)
-        .reads(&sums)
-        .writes(&mean)
-        .uniform(&[blocks as u32, (count as f32).to_bits()])
-        .groups(1)?;
-    Ok(gpu.tensor(first_words(&mean, 1), Shape::from([1])))
+    Ok(gpu.tensor(first_words(&parts, blocks), Shape::from([blocks])))
 }
 
 fn backward(

@@ -44,14 +44,14 @@ impl Difference {
 
 /// A back end's kernels. [`ImageDifferenceOps`] adds the dispatch and the tape.
 pub trait ImageDifferenceKernels: Backend {
-    /// The mean `[1]` over all numbers of two images of the same shape.
+    /// The mean over all numbers of two images of the same shape, in parts that are to be added up, `[P]`.
     fn image_difference_forward(
         difference: Difference,
         image: FloatTensor<Self>,
         truth: FloatTensor<Self>,
     ) -> FloatTensor<Self>;
 
-    /// The gradient of the image from that of the mean `[1]`.
+    /// The gradient of the image from those of the parts `[P]`.
     fn image_difference_backward(
         difference: Difference,
         image: FloatTensor<Self>,
@@ -65,7 +65,7 @@ pub trait ImageDifferenceKernels: Backend {
     NdArray: cfg(feature = "ndarray"), Flex: cfg(feature = "flex"), Cube: cfg(feature = "wgpu"), Autodiff
 )]
 pub trait ImageDifferenceOps: Backend {
-    /// `[1]`; see [`mean_difference`].
+    /// `[P]`; see [`mean_difference_in_parts`].
     fn image_difference(
         difference: Difference,
         image: FloatTensor<Self>,
@@ -93,8 +93,8 @@ impl<B: ImageDifferenceOps + ImageDifferenceKernels, C: CheckpointStrategy> Imag
     ) -> FloatTensor<Self> {
         let node = image.node();
         let (image, truth) = (image.into_primitive(), truth.into_primitive());
-        let mean = B::image_difference_forward(difference, image.clone(), truth.clone());
-        recorded::<B, C, _, _>([node], (mean, (difference, image, truth)), |(difference, image, truth), upstream| {
+        let parts = B::image_difference_forward(difference, image.clone(), truth.clone());
+        recorded::<B, C, _, _>([node], (parts, (difference, image, truth)), |(difference, image, truth), upstream| {
             [B::image_difference_backward(difference, image, truth, upstream)]
         })
     }
@@ -118,6 +118,20 @@ impl<B: ImageDifferenceOps + ImageDifferenceKernels, C: CheckpointStrategy> Imag
 /// # Panics
 /// If the shapes differ.
 pub fn mean_difference<const D: usize>(difference: Difference, image: Tensor<D>, truth: Tensor<D>) -> Tensor<1> {
+    let parts = mean_difference_in_parts(difference, image, truth);
+    if parts.dims() == [1] { parts } else { parts.sum() }
+}
+
+/// [`mean_difference`] in parts that are to be added up, `[P]`. A backward pass from several numbers is that of their sum, so a
+/// loss needs no launch for the sum.
+///
+/// # Panics
+/// If the shapes differ.
+pub fn mean_difference_in_parts<const D: usize>(
+    difference: Difference,
+    image: Tensor<D>,
+    truth: Tensor<D>,
+) -> Tensor<1> {
     assert_eq!(image.dims(), truth.dims(), "both images must have the same size");
     Tensor::from_dispatch(Dispatch::image_difference(difference, image.into_dispatch(), truth.into_dispatch()))
 }

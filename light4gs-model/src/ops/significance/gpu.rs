@@ -4,7 +4,7 @@ use burn::backend::tensor::FloatTensor;
 use burn::tensor::Shape;
 use burn_fusion::{Fusion, FusionBackend};
 use burn_wgpu::{CubeBackend, CubeTensor};
-use light4gs_render::{SCORES, View};
+use light4gs_render::SCORES;
 use light4gs_shaders::{SIGNIFICANCE, SIGNIFICANCE_GATHER};
 
 use super::SignificanceOps;
@@ -28,9 +28,9 @@ fn kernels() -> Vec<Kernel> {
 }
 
 /// Scores `[N, 3]`; see [`SCORES`].
-fn scores(inputs: SplatInputs<CubeBackend>, view: View) -> Result<CubeTensor, GpuError> {
+fn scores(inputs: SplatInputs<CubeBackend>, view: SplatView) -> Result<CubeTensor, GpuError> {
     let gpu = Gpu::of(&inputs.means)?;
-    let Begun { frame, intersections: lists, .. } = begin(&gpu, inputs, SplatView { view, room: None, trained: None })?;
+    let Begun { frame, intersections: lists, .. } = begin(&gpu, inputs, SplatView { room: None, ..view })?;
     let sums = gpu.allocate("sums of intersections", SUMS * lists.count)?;
     let chunks = frame.chunks(lists.count);
     let carried = gpu.allocate("pixels between chunks", if chunks > 1 { frame.pixels() } else { 0 })?;
@@ -60,7 +60,7 @@ fn scores(inputs: SplatInputs<CubeBackend>, view: View) -> Result<CubeTensor, Gp
 }
 
 impl SignificanceOps for CubeBackend {
-    fn significance(inputs: SplatInputs<Self>, SplatView { view, .. }: SplatView) -> FloatTensor<Self> {
+    fn significance(inputs: SplatInputs<Self>, view: SplatView) -> FloatTensor<Self> {
         scores(inputs, view).unwrap_or_else(|error| error.raise())
     }
 }

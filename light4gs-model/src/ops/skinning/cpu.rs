@@ -8,12 +8,11 @@ use std::ops::Range;
 use std::sync::Arc;
 
 use burn::backend::TensorMetadata;
-use burn::backend::tensor::FloatTensor;
 use light4gs_render::lanes::{LANES, LaneKernel, Lanes, dispatch};
 use rayon::prelude::*;
 
 use super::cpu_backward::skin_backward;
-use super::{MOVED, PLACE, POSE, POSED, SkinningKernels, SkinningTensors};
+use super::{MOVED, MovedTensors, PLACE, POSE, POSED, SkinningKernels, SkinningTensors};
 use crate::ops::for_cpu_back_ends;
 use crate::ops::host::{HostBackend, HostTensor};
 
@@ -23,6 +22,9 @@ pub(super) const CHUNK: usize = 256;
 /// Exponent of 2, relative to the largest, below which a weight is 0. Such a weight is 12 digits below rounding, and times a small
 /// gradient it would be a denormal number, on which processors are slow.
 const SMALLEST_EXPONENT: f32 = -64.0;
+
+/// Numbers of a row of moved Gaussians: position, quaternion.
+pub(super) const ROW: usize = MOVED[0] + MOVED[1];
 
 /// One value for each Gaussian of a group of eight.
 pub(super) type Block = [f32; LANES];
@@ -237,7 +239,7 @@ impl<const W: usize> LaneKernel for Forward<'_, W> {
         let mut weights = vec![[0.0; LANES]; self.nodes.len()];
         let inputs = self.means.chunks(3 * LANES).zip(self.quats.chunks(4 * LANES));
         let inputs = inputs.zip(self.stillness.chunks(W * LANES));
-        let outputs = self.moved.chunks_mut(MOVED * LANES).zip(self.blended);
+        let outputs = self.moved.chunks_mut(ROW * LANES).zip(self.blended);
         for (((means, quats), stillness), (moved, blended)) in inputs.zip(outputs) {
             let mean = columns::<L, 3>(means);
             let scaled = as_exponents(&columns::<L, W>(stillness));
@@ -267,7 +269,7 @@ impl<const W: usize> LaneKernel for Forward<'_, W> {
             let quat = columns::<L, 4>(quats);
             let at = place(&pose, &mean);
             let turned = product(&[pose[12], pose[13], pose[14], pose[15]], &quat);
-            let mut all = [L::splat(0.0); MOVED];
+            let mut all = [L::splat(0.0); ROW];
             all[..3].copy_from_slice(&at);
             all[3..].copy_from_slice(&turned);
             to_rows(&all, moved);
@@ -293,13 +295,13 @@ fn skin_slices(inputs: &SkinningSlices) -> (Vec<f32>, Vec<BlendedGroup>) {
 fn skin_with<const W: usize>(inputs: &SkinningSlices) -> (Vec<f32>, Vec<BlendedGroup>) {
     let nodes = inputs.nodes::<W>();
     let count = inputs.count();
-    let mut moved = vec![0.0; MOVED * count];
+    let mut moved = vec![0.0; ROW * count];
     let mut blended = vec![BlendedGroup::default(); count.div_ceil(LANES)];
     let chunks = (
         inputs.means.par_chunks(3 * CHUNK),
         inputs.quats.par_chunks(4 * CHUNK),
         inputs.stillness.par_chunks(W * CHUNK),
-        moved.par_chunks_mut(MOVED * CHUNK),
+        moved.par_chunks_mut(ROW * CHUNK),
         blended.par_chunks_mut(CHUNK / LANES),
     );
     chunks.into_par_iter().for_each(|(means, quats, stillness, moved, blended)| {
@@ -331,12 +333,12 @@ impl CpuSaved {
     }
 }
 
-/// Stillness `[N, 1]` and affinities `[N, H]`, a Gaussian's numbers next to each other.
-fn side_by_side(stillness: &[f32], affinities: &[f32], width: usize) -> Vec<f32> {
-    let mut rows = Vec::with_capacity(stillness.len() + affinities.len());
-    for (i, stillness) in stillness.iter().enumerate() {
-        rows.push(*stillness);
-        rows.extend_from_slice(&affinities[width * i..width * (i + 1)]);
+/// Two matrices of these widths, the first of 1 or more, each row behind that of the other.
+fn side_by_side([first, second]: [&[f32]; 2], [width, other]: [usize; 2]) -> Vec<f32> {
+    let mut rows = Vec::with_capacity(first.len() + second.len());
+    for (i, row) in first.chunks_exact(width).enumerate() {
+        rows.extend_from_slice(row);
+        rows.extend_from_slice(&second[other * i..other * (i + 1)]);
     }
     rows
 }
@@ -346,22 +348,27 @@ fn columns_of(matrix: &[f32], width: usize, columns: Range<usize>) -> Vec<f32> {
     matrix.chunks_exact(width).flat_map(|row| &row[columns.clone()]).copied().collect()
 }
 
-fn forward_on_cpu<B: HostBackend>(tensors: SkinningTensors<B>) -> (FloatTensor<B>, CpuSaved) {
+fn forward_on_cpu<B: HostBackend>(tensors: SkinningTensors<B>) -> (MovedTensors<B>, CpuSaved) {
     let affinities = tensors.affinities.shape()[1];
     let [means, quats, stillness, of_gaussians, nodes] = tensors.into_array().map(B::to_host);
-    let stillness = side_by_side(stillness.as_slice(), of_gaussians.as_slice(), affinities);
+    let stillness = side_by_side([stillness.as_slice(), of_gaussians.as_slice()], [1, affinities]);
     let mut saved =
         CpuSaved { means, quats, stillness: Arc::new(stillness), nodes, affinities, blended: Arc::default() };
     let (moved, blended) = skin_slices(&saved.slices());
     saved.blended = Arc::new(blended);
-    let count = moved.len() / MOVED;
-    (B::from_values(moved, [count, MOVED]), saved)
+    let count = moved.len() / ROW;
+    let part = |columns: Range<usize>| {
+        let width = columns.len();
+        B::from_values(columns_of(&moved, ROW, columns), [count, width])
+    };
+    (MovedTensors { means: part(0..MOVED[0]), quats: part(MOVED[0]..ROW) }, saved)
 }
 
-fn backward_on_cpu<B: HostBackend>(saved: CpuSaved, gradient: FloatTensor<B>) -> SkinningTensors<B> {
-    let upstream = B::to_host(gradient);
+fn backward_on_cpu<B: HostBackend>(saved: CpuSaved, gradients: MovedTensors<B>) -> SkinningTensors<B> {
+    let [of_means, of_quats] = [gradients.means, gradients.quats].map(B::to_host);
+    let upstream = side_by_side([of_means.as_slice(), of_quats.as_slice()], MOVED);
     let affinities = saved.affinities;
-    let gradients = skin_backward(&saved.slices(), &saved.blended, upstream.as_slice());
+    let gradients = skin_backward(&saved.slices(), &saved.blended, &upstream);
     let count = gradients.means.len() / 3;
     let part = |columns: Range<usize>| {
         let shape = [count, columns.len()];
@@ -381,12 +388,12 @@ for_cpu_back_ends! {
     SkinningKernels {
         type Saved = CpuSaved;
 
-        fn skinning_forward(tensors: SkinningTensors<Self>) -> (FloatTensor<Self>, CpuSaved) {
+        fn skinning_forward(tensors: SkinningTensors<Self>) -> (MovedTensors<Self>, CpuSaved) {
             forward_on_cpu(tensors)
         }
 
-        fn skinning_backward(saved: CpuSaved, gradient: FloatTensor<Self>) -> SkinningTensors<Self> {
-            backward_on_cpu(saved, gradient)
+        fn skinning_backward(saved: CpuSaved, gradients: MovedTensors<Self>) -> SkinningTensors<Self> {
+            backward_on_cpu(saved, gradients)
         }
     }
 }

@@ -16,10 +16,10 @@ use light4gs_render::lanes::{LANES, LaneKernel, Lanes, dispatch};
 use rayon::prelude::*;
 
 use super::cpu::{
-    BlendedGroup, Block, CHUNK, Node, STILL, SkinningSlices, as_exponents, columns, loaded, product, spread, stored,
-    to_rows, weight,
+    BlendedGroup, Block, CHUNK, Node, ROW, STILL, SkinningSlices, as_exponents, columns, loaded, product, spread,
+    stored, to_rows, weight,
 };
-use super::{MOVED, PLACE, POSE, POSED};
+use super::{PLACE, POSE, POSED};
 
 /// Most tasks, so that their sums take no more memory than some thousand Gaussians.
 const MOST_TASKS: usize = 64;
@@ -110,7 +110,7 @@ struct Group<L> {
 impl<L: Lanes> Group<L> {
     #[inline(always)]
     fn new(means: &[f32], quats: &[f32], upstream: &[f32]) -> Self {
-        let upstream = columns::<L, MOVED>(upstream);
+        let upstream = columns::<L, ROW>(upstream);
         Self {
             mean: columns::<L, 3>(means),
             quat: columns::<L, 4>(quats),
@@ -252,7 +252,7 @@ impl<const W: usize> LaneKernel for Backward<'_, W> {
         let mut of_stillness = vec![[[0.0; LANES]; W]; CHUNK / LANES];
         let inputs = self.means.chunks(3 * LANES).zip(self.quats.chunks(4 * LANES));
         let inputs = inputs.zip(self.stillness.chunks(W * LANES));
-        let inputs = inputs.zip(self.upstream.chunks(MOVED * LANES)).zip(self.blended);
+        let inputs = inputs.zip(self.upstream.chunks(ROW * LANES)).zip(self.blended);
         let outputs = self.of_means.chunks_mut(3 * LANES).zip(self.of_quats.chunks_mut(4 * LANES));
         let mut rows_of_stillness = self.of_stillness.chunks_mut(W * LANES);
         let last = self.blended.len() - 1;
@@ -276,7 +276,7 @@ impl<const W: usize> LaneKernel for Backward<'_, W> {
     }
 }
 
-/// Gradients of all inputs from `upstream [N, 7]`.
+/// Gradients of all inputs from `upstream [N, 7]`: those of position and quaternion.
 pub(super) fn skin_backward(inputs: &SkinningSlices, blended: &[BlendedGroup], upstream: &[f32]) -> SkinningGradients {
     match inputs.affinities {
         0 => skin_backward_with::<1>(inputs, blended, upstream),
@@ -303,7 +303,7 @@ fn skin_backward_with<const W: usize>(
         inputs.quats.par_chunks(4 * task),
         inputs.stillness.par_chunks(W * task),
         blended.par_chunks(task / LANES),
-        upstream.par_chunks(MOVED * task),
+        upstream.par_chunks(ROW * task),
         means.par_chunks_mut(3 * task),
         quats.par_chunks_mut(4 * task),
         stillness.par_chunks_mut(W * task),

@@ -1,15 +1,16 @@
 //! Linear blend skinning on a GPU.
 
 use burn::backend::TensorMetadata;
-use burn::backend::tensor::FloatTensor;
-use burn::tensor::{Device, Shape, TensorData};
+use burn::tensor::{Device, Shape, Tensor, TensorData};
 use burn_fusion::{Fusion, FusionBackend};
-use burn_wgpu::{CubeBackend, CubeTensor};
+use burn_wgpu::CubeBackend;
 use cubecl::server::Handle;
-use light4gs_shaders::{SKINNING, SKINNING_AFFINITIES, SKINNING_BACKWARD, SKINNING_GATHER, SKINNING_NODES, Shader};
+use light4gs_shaders::{SKINNING, SKINNING_BACKWARD, SKINNING_GATHER, SKINNING_NODES, Shader};
 
-use super::{INPUTS, MOST_AFFINITIES, MOVED, POSED, SkinningInputs, SkinningKernels, SkinningTensors, skin};
-use crate::gpu::{Gpu, Kernel, Launch, Places, buffer_of, first_words};
+use super::{
+    INPUTS, MOST_AFFINITIES, MOVED, Moved, MovedTensors, POSED, SkinningInputs, SkinningKernels, SkinningTensors, skin,
+};
+use crate::gpu::{Arena, Gpu, Kernel, Launch, Places, buffer_of, first_words};
 use crate::gpu_error::GpuError;
 use crate::ops::fusion::{leaf, resolve};
 use crate::ops::sample::{GpuOperation, Numbers};
@@ -31,10 +32,8 @@ pub(in crate::ops) const OPERATION: GpuOperation = GpuOperation {
 
 /// The kernels of this file, for every number of affinities.
 fn kernels() -> Vec<Kernel> {
-    let by_affinities =
-        |affinities| [SKINNING, SKINNING_NODES, SKINNING_GATHER].map(|shader| kernel(shader, affinities));
-    let of_affinities = (1..=MOST_AFFINITIES).map(|affinities| kernel(SKINNING_AFFINITIES, affinities));
-    (0..=MOST_AFFINITIES).flat_map(by_affinities).chain(of_affinities).chain([Kernel::new(SKINNING_BACKWARD)]).collect()
+    let shaders = [SKINNING, SKINNING_BACKWARD, SKINNING_NODES, SKINNING_GATHER];
+    (0..=MOST_AFFINITIES).flat_map(|affinities| shaders.map(|shader| kernel(shader, affinities))).collect()
 }
 
 fn kernel(shader: Shader, affinities: usize) -> Kernel {
@@ -63,12 +62,17 @@ fn words(values: &[usize]) -> Vec<u32> {
     values.iter().map(|value| *value as u32).collect()
 }
 
-fn forward(tensors: SkinningTensors<CubeBackend>) -> Result<(CubeTensor, GpuSaved), GpuError> {
+/// Lengths of moved positions and quaternions.
+fn lengths(count: usize) -> [usize; 2] {
+    MOVED.map(|columns| columns * count)
+}
+
+fn forward(tensors: SkinningTensors<CubeBackend>) -> Result<(MovedTensors<CubeBackend>, GpuSaved), GpuError> {
     let gpu = Gpu::of(&tensors.means)?;
     let (count, node_count) = (tensors.means.shape()[0], tensors.nodes.shape()[0]);
     let affinities = tensors.affinities.shape()[1];
     let [means, quats, stillness, of_gaussians, nodes] = tensors.into_array().map(buffer_of);
-    let moved = gpu.allocate("moved Gaussians", MOVED * count)?;
+    let moved = Arena::new(&gpu, "moved Gaussians", &lengths(count))?;
     let blended = gpu.allocate("blended poses", BLENDED * count)?;
     Launch::new(&gpu.client, kernel(SKINNING, affinities))
         .reads(&means)
@@ -76,41 +80,38 @@ fn forward(tensors: SkinningTensors<CubeBackend>) -> Result<(CubeTensor, GpuSave
         .reads(&stillness)
         .reads(&of_gaussians)
         .reads(&nodes)
-        .writes(&moved)
+        .writes(&moved.buffer)
         .writes(&blended)
-        .uniform(&words(&[count, node_count]))
+        .uniform(&words(&[count, node_count, moved.places.starts[1]]))
         .invocations(count)?;
-    let output = gpu.tensor(first_words(&moved, MOVED * count), Shape::from([count, MOVED]));
+    let part = |k: usize| gpu.tensor(moved.tensor(k), Shape::from([count, MOVED[k]]));
+    let output = MovedTensors { means: part(0), quats: part(1) };
     let saved = GpuSaved { count, node_count, affinities, means, quats, of_gaussians, nodes, blended };
     Ok((output, saved))
 }
 
-fn backward(saved: GpuSaved, upstream: CubeTensor) -> Result<SkinningTensors<CubeBackend>, GpuError> {
-    let gpu = Gpu::of(&upstream)?;
+fn backward(saved: GpuSaved, upstream: MovedTensors<CubeBackend>) -> Result<SkinningTensors<CubeBackend>, GpuError> {
+    let gpu = Gpu::of(&upstream.means)?;
     let GpuSaved { count, node_count, affinities, means, quats, of_gaussians, nodes, blended } = saved;
-    let handed = gpu.allocate("gradients by blended poses", HANDED * count)?;
-    // Those of the Gaussians in one buffer, in the order of the inputs.
-    let widths = [3, 4, 1, affinities];
+    let upstream = [upstream.means, upstream.quats].map(buffer_of);
+    let upstream = Arena::of(&gpu, "gradients of moved Gaussians", &upstream, &lengths(count))?;
+    // What the Gaussians hand to the nodes, and their gradients, in the order of the inputs.
+    let widths = [HANDED, 3, 4, 1, affinities];
     let layout = Places::new(&widths.map(|width| width * count));
-    let gradients = gpu.allocate("gradients of Gaussians", layout.total)?;
-    Launch::new(&gpu.client, Kernel::new(SKINNING_BACKWARD))
+    let results = gpu.allocate("gradients of Gaussians", layout.total)?;
+    let [_, of_means, of_quats, of_stillness, of_affinities] = layout.starts[..] else { unreachable!("five arrays") };
+    let starts = [upstream.places.starts[1], of_means, of_quats, of_stillness, of_affinities];
+    Launch::new(&gpu.client, kernel(SKINNING_BACKWARD, affinities))
         .reads(&means)
         .reads(&quats)
         .reads(&blended)
-        .reads(&buffer_of(upstream))
-        .writes(&handed)
-        .writes(&gradients)
-        .uniform(&words(&[count, layout.starts[1], layout.starts[2]]))
+        .reads(&upstream.buffer)
+        .reads(&nodes)
+        .reads(&of_gaussians)
+        .writes(&results)
+        .uniform(&words(&[&[count, node_count][..], &starts].concat()))
         .invocations(count)?;
-    if affinities > 0 {
-        Launch::new(&gpu.client, kernel(SKINNING_AFFINITIES, affinities))
-            .reads(&handed)
-            .reads(&nodes)
-            .reads(&of_gaussians)
-            .writes(&layout.of(&gradients, 3))
-            .uniform(&words(&[count, node_count]))
-            .invocations(count)?;
-    }
+    let handed = layout.of(&results, 0);
 
     let slice = count.div_ceil(MOST_SLICES).clamp(SLICE, gpu.longest_loop());
     let slices = count.div_ceil(slice);
@@ -133,8 +134,7 @@ fn backward(saved: GpuSaved, upstream: CubeTensor) -> Result<SkinningTensors<Cub
         .invocations(of_node * node_count)?;
 
     let of_nodes = gpu.tensor(first_words(&of_nodes, columns * node_count), Shape::from([node_count, columns]));
-    let mut of_gaussians =
-        (0..INPUTS - 1).map(|k| gpu.tensor(layout.of(&gradients, k), Shape::from([count, widths[k]])));
+    let mut of_gaussians = (1..INPUTS).map(|k| gpu.tensor(layout.of(&results, k), Shape::from([count, widths[k]])));
     let mut next = || of_gaussians.next().expect("a piece for each input");
     Ok(SkinningTensors::from_array([next(), next(), next(), next(), of_nodes]))
 }
@@ -142,26 +142,27 @@ fn backward(saved: GpuSaved, upstream: CubeTensor) -> Result<SkinningTensors<Cub
 impl SkinningKernels for CubeBackend {
     type Saved = GpuSaved;
 
-    fn skinning_forward(tensors: SkinningTensors<Self>) -> (CubeTensor, GpuSaved) {
+    fn skinning_forward(tensors: SkinningTensors<Self>) -> (MovedTensors<Self>, GpuSaved) {
         forward(tensors).unwrap_or_else(|error| error.raise())
     }
 
-    fn skinning_backward(saved: GpuSaved, gradient: CubeTensor) -> SkinningTensors<Self> {
-        backward(saved, gradient).unwrap_or_else(|error| error.raise())
+    fn skinning_backward(saved: GpuSaved, gradients: MovedTensors<Self>) -> SkinningTensors<Self> {
+        backward(saved, gradients).unwrap_or_else(|error| error.raise())
     }
 }
 
 impl<B: FusionBackend + SkinningKernels> SkinningKernels for Fusion<B> {
     type Saved = B::Saved;
 
-    fn skinning_forward(tensors: SkinningTensors<Self>) -> (FloatTensor<Self>, B::Saved) {
+    fn skinning_forward(tensors: SkinningTensors<Self>) -> (MovedTensors<Self>, B::Saved) {
         let tensors = SkinningTensors::from_array(tensors.into_array().map(resolve::<B>));
         let (moved, saved) = B::skinning_forward(tensors);
-        (leaf::<B>(moved), saved)
+        (MovedTensors { means: leaf::<B>(moved.means), quats: leaf::<B>(moved.quats) }, saved)
     }
 
-    fn skinning_backward(saved: B::Saved, gradient: FloatTensor<Self>) -> SkinningTensors<Self> {
-        let gradients = B::skinning_backward(saved, resolve::<B>(gradient)).into_array();
+    fn skinning_backward(saved: B::Saved, gradients: MovedTensors<Self>) -> SkinningTensors<Self> {
+        let gradients = MovedTensors { means: resolve::<B>(gradients.means), quats: resolve::<B>(gradients.quats) };
+        let gradients = B::skinning_backward(saved, gradients).into_array();
         SkinningTensors::from_array(gradients.map(leaf::<B>))
     }
 }
@@ -177,5 +178,6 @@ fn sample(device: &Device, affinities: usize) -> Vec<TensorData> {
     let inputs = SkinningInputs { affinities: own, ..SkinningInputs::new(means, quats, stillness, nodes) };
     let leaves = [&inputs.means, &inputs.quats, &inputs.stillness, &inputs.nodes].map(Clone::clone);
     let leaves: Vec<_> = leaves.into_iter().chain(inputs.affinities.clone()).collect();
-    numbers.with_gradients(skin(inputs), &leaves)
+    let Moved { means, quats } = skin(inputs);
+    numbers.with_gradients(Tensor::cat(vec![means, quats], 1), &leaves)
 }

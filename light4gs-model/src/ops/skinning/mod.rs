@@ -10,10 +10,10 @@ use std::fmt::Debug;
 
 use burn::backend::autodiff::checkpoint::strategy::CheckpointStrategy;
 use burn::backend::tensor::FloatTensor;
-use burn::backend::{Autodiff, Backend, Dispatch, ExtensionType, backend_extension};
-use burn::tensor::Tensor;
+use burn::backend::{Autodiff, Backend, Dispatch, ExtensionType, TensorMetadata, backend_extension};
+use burn::tensor::{Shape, Tensor};
 
-use super::{for_all_back_ends, recorded};
+use super::{for_all_back_ends, recorded_outputs};
 
 /// Numbers of a node's pose: rotation matrix row by row (9), offset (3), quaternion (4).
 const POSE: usize = 16;
@@ -21,8 +21,8 @@ const POSE: usize = 16;
 pub(crate) const PLACE: usize = 4;
 /// Numbers of a posed node before its affinities.
 pub(crate) const POSED: usize = PLACE + POSE;
-/// Numbers of a moved Gaussian: position (3), quaternion (4).
-const MOVED: usize = 7;
+/// Numbers of a moved Gaussian: position, quaternion.
+const MOVED: [usize; 2] = [3, 4];
 
 /// Most affinities of a Gaussian and of a node.
 pub const MOST_AFFINITIES: usize = 4;
@@ -57,16 +57,25 @@ impl<B: Backend> SkinningTensors<B> {
     }
 }
 
+/// The moved Gaussians, or their gradients.
+#[derive(Clone, Debug, ExtensionType)]
+pub struct MovedTensors<B: Backend> {
+    /// `[N, 3]`, world units.
+    pub means: FloatTensor<B>,
+    /// `[N, 4]`: quaternions (w, x, y, z).
+    pub quats: FloatTensor<B>,
+}
+
 /// A back end's kernels. [`SkinningOps`] adds the dispatch and the tape.
 pub trait SkinningKernels: Backend {
     /// What the backward pass needs from the forward pass.
     type Saved: Clone + Debug + Send + 'static;
 
-    /// Positions and quaternions `[N, 7]`.
-    fn skinning_forward(tensors: SkinningTensors<Self>) -> (FloatTensor<Self>, Self::Saved);
+    /// Positions and quaternions.
+    fn skinning_forward(tensors: SkinningTensors<Self>) -> (MovedTensors<Self>, Self::Saved);
 
-    /// Gradients of all inputs from that of the output `[N, 7]`.
-    fn skinning_backward(saved: Self::Saved, gradient: FloatTensor<Self>) -> SkinningTensors<Self>;
+    /// Gradients of all inputs from those of positions and quaternions.
+    fn skinning_backward(saved: Self::Saved, gradients: MovedTensors<Self>) -> SkinningTensors<Self>;
 }
 
 /// Skinning on every back end that has [`SkinningKernels`], differentiable under [`Autodiff`].
@@ -74,26 +83,39 @@ pub trait SkinningKernels: Backend {
     NdArray: cfg(feature = "ndarray"), Flex: cfg(feature = "flex"), Cube: cfg(feature = "wgpu"), Autodiff
 )]
 pub trait SkinningOps: Backend {
-    /// Positions and quaternions `[N, 7]`; see [`skin`].
-    fn skinning(#[extension_type] tensors: SkinningTensors<Self>) -> FloatTensor<Self>;
+    /// Positions and quaternions; see [`skin`].
+    fn skinning(#[extension_type] tensors: SkinningTensors<Self>) -> MovedTensors<Self>;
 }
 
 for_all_back_ends! {
     SkinningOps with SkinningKernels {
-        fn skinning(tensors: SkinningTensors<Self>) -> FloatTensor<Self> {
+        fn skinning(tensors: SkinningTensors<Self>) -> MovedTensors<Self> {
             Self::skinning_forward(tensors).0
         }
     }
 }
 
 impl<B: SkinningOps + SkinningKernels, C: CheckpointStrategy> SkinningOps for Autodiff<B, C> {
-    fn skinning(tensors: SkinningTensors<Self>) -> FloatTensor<Self> {
+    fn skinning(tensors: SkinningTensors<Self>) -> MovedTensors<Self> {
         let tensors = tensors.into_array();
         let nodes = tensors.each_ref().map(|tensor| tensor.node());
         let inner = SkinningTensors::from_array(tensors.map(|tensor| tensor.into_primitive()));
-        recorded::<B, C, _, _>(nodes, B::skinning_forward(inner), |saved, gradient| {
-            B::skinning_backward(saved, gradient).into_array()
-        })
+        let (MovedTensors { means, quats }, saved) = B::skinning_forward(inner);
+        let (count, device, dtype) = (means.shape()[0], means.device(), means.dtype());
+        let saved = (saved, count, device, dtype);
+        let moved = recorded_outputs::<B, C, _, _, _>(
+            nodes,
+            ([means, quats], saved),
+            |(saved, count, device, dtype), [means, quats]| {
+                let or_zeros = |gradient: Option<FloatTensor<B>>, columns: usize| {
+                    gradient.unwrap_or_else(|| B::float_zeros(Shape::from([count, columns]), &device, dtype.into()))
+                };
+                let gradients = MovedTensors { means: or_zeros(means, MOVED[0]), quats: or_zeros(quats, MOVED[1]) };
+                B::skinning_backward(saved, gradients).into_array()
+            },
+        );
+        let [means, quats] = moved;
+        MovedTensors { means, quats }
     }
 }
 
@@ -121,8 +143,17 @@ impl SkinningInputs {
     }
 }
 
+/// Gaussians that nodes have moved.
+#[derive(Clone, Debug)]
+pub struct Moved {
+    /// `[N, 3]`, world units.
+    pub means: Tensor<2>,
+    /// `[N, 4]`: quaternions (w, x, y, z), not normalized.
+    pub quats: Tensor<2>,
+}
+
 /// Linear blend skinning of N Gaussians by B nodes and one that stands still (Lewis et al. 2000; for Gaussians SC-GS, Huang et al.
-/// 2024). Returns `[N, 7]`: positions (3) and quaternions (4), which are not normalized.
+/// 2024).
 ///
 /// ```text
 /// w   = softmax over b of (affinities · affinities_b - precision_b |mean - anchor_b|², and stillness for the node that stands still)
@@ -154,14 +185,14 @@ impl SkinningInputs {
 ///     0.0, -1.0, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 2.0, half, 0.0, 0.0, half,
 /// ], 20);
 /// let moved = skin(SkinningInputs::new(means, quats, stillness, nodes));
-/// let moved = moved.into_data().to_vec::<f32>().unwrap();
-/// assert_eq!(moved[..7], [0.0, 1.0, 2.0, half, 0.0, 0.0, half]);
-/// assert_eq!(moved[7..], [1.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0]);
+/// let [means, quats] = [moved.means, moved.quats].map(|tensor| tensor.into_data().to_vec::<f32>().unwrap());
+/// assert_eq!(means, [0.0, 1.0, 2.0, 1.0, 0.0, 0.0]);
+/// assert_eq!(quats, [half, 0.0, 0.0, half, 1.0, 0.0, 0.0, 0.0]);
 /// ```
 ///
 /// # Panics
 /// If the shapes do not belong together, or there is no node; the message names the tensor.
-pub fn skin(inputs: SkinningInputs) -> Tensor<2> {
+pub fn skin(inputs: SkinningInputs) -> Moved {
     let SkinningInputs { means, quats, stillness, affinities, nodes } = inputs;
     let count = means.dims()[0];
     assert!(nodes.dims()[0] > 0, "nodes must have one row or more");
@@ -173,11 +204,12 @@ pub fn skin(inputs: SkinningInputs) -> Tensor<2> {
     assert!(columns <= MOST_AFFINITIES, "a Gaussian has at most {MOST_AFFINITIES} affinities");
     assert_eq!(rows, count, "affinities must be [N, H]");
     assert_eq!(nodes.dims()[1], POSED + columns, "nodes must be [B, 20 + H]");
-    Tensor::from_dispatch(Dispatch::skinning(SkinningTensors {
+    let moved = Dispatch::skinning(SkinningTensors {
         means: means.into_dispatch(),
         quats: quats.into_dispatch(),
         stillness: stillness.into_dispatch(),
         affinities: affinities.into_dispatch(),
         nodes: nodes.into_dispatch(),
-    }))
+    });
+    Moved { means: Tensor::from_dispatch(moved.means), quats: Tensor::from_dispatch(moved.quats) }
 }

@@ -1,19 +1,22 @@
 //! Splatting on a GPU: the kernels of `shaders/` in their order.
 
 use burn::backend::TensorMetadata;
-use burn::backend::tensor::FloatTensor;
+use burn::backend::ops::FloatTensorOps;
 use burn::tensor::Shape;
 use burn_fusion::{Fusion, FusionBackend};
-use burn_wgpu::{CubeBackend, CubeTensor};
+use burn_wgpu::CubeBackend;
 use cubecl::server::Handle;
 use light4gs_codec::rendering::TILE;
-use light4gs_render::{CHANNELS, View};
+use light4gs_render::View;
 use light4gs_shaders::{CELL_COUNTS, INTERSECT, PROJECT, PROJECT_BACKWARD, RASTERIZE, RASTERIZE_BACKWARD, Shader};
 
-use super::{SplatInputs, SplatKernels, SplatOutputs, SplatView};
+use super::{OfPixels, SplatInputs, SplatKernels, SplatOutputs, SplatView};
 use crate::gpu::sort::{Sorted, bits_for, prefix_sum, ranges, sort};
-use crate::gpu::{CHUNK, Gpu, Kernel, Launch, PLACE_ALIGNMENT, Places, Team, buffer_of, choose_team, first_words};
+use crate::gpu::{
+    Arena, CHUNK, Gpu, Kernel, Launch, PLACE_ALIGNMENT, Places, Team, buffer_of, choose_team, first_words,
+};
 use crate::gpu_error::GpuError;
+use crate::ops::activation::bound_reached;
 use crate::ops::fusion::{int_leaf, leaf, resolve};
 use crate::ops::sample::GpuOperation;
 
@@ -32,6 +35,8 @@ pub(in crate::ops) struct Frame {
     rest: usize,
     /// Intersections that there is room for; `None`: for all, as soon as they are counted.
     room: Option<usize>,
+    /// Whether scales are logarithms and opacities logits.
+    logarithms: bool,
 }
 
 impl Frame {
@@ -45,6 +50,11 @@ impl Frame {
 
     pub(in crate::ops) fn cells(&self) -> usize {
         self.size().iter().map(|side| side.div_ceil(self.team.cell) as usize).product()
+    }
+
+    /// Numbers of image, alpha and depth.
+    fn values(&self) -> [usize; 3] {
+        [3, 1, 1].map(|channels| channels * self.pixels())
     }
 
     /// `View` of `shaders/include/view.wgsl`, for chunk `chunk` of `chunks` of the cells' lists.
@@ -63,10 +73,12 @@ impl Frame {
             [least.x, least.y, most.x, most.y],
         ];
         let side = self.team.cell;
+        let [_, alpha, depth] = Places::new(&self.values()).starts[..] else { unreachable!("three arrays") };
         let words = [
             [width, height, width.div_ceil(TILE as u32), height.div_ceil(TILE as u32)],
             [width.div_ceil(side), height.div_ceil(side), chunk as u32, u32::from(chunk + 1 == chunks)],
             [self.gaussians as u32, self.view.sh_degree as u32, self.rest as u32, self.room.unwrap_or(0) as u32],
+            [alpha as u32, depth as u32, 0, 0],
         ];
         floats.iter().flatten().map(|value| value.to_bits()).chain(words.into_iter().flatten()).collect()
     }
@@ -120,7 +132,7 @@ pub struct GpuSplatSaved {
     shapes: [Shape; 7],
     inputs: InputBuffers,
     intersections: Intersections,
-    rendering: Handle,
+    rendering: Arena,
 }
 
 /// The operation for checks.
@@ -128,10 +140,15 @@ pub(in crate::ops) const OPERATION: GpuOperation = GpuOperation { name: "splat",
 
 /// The kernels of this file.
 fn kernels() -> Vec<Kernel> {
-    let cells = Team::cells().into_iter().flat_map(|cell| [projecting(cell), by_cells(INTERSECT, cell)]);
-    let teams =
-        Team::all().flat_map(|team| [RASTERIZE, RASTERIZE_BACKWARD].map(|shader| Kernel::new(shader).blending(team)));
-    cells.chain(teams).chain([CELL_COUNTS, PROJECT_BACKWARD].map(Kernel::new)).collect()
+    let flags = [false, true];
+    let projecting = |cell| flags.map(|logarithms| projecting(cell, logarithms));
+    let cells =
+        Team::cells().into_iter().flat_map(|cell| projecting(cell).into_iter().chain([by_cells(INTERSECT, cell)]));
+    let teams = Team::all().flat_map(|team| {
+        let rasterizing = Kernel::new(RASTERIZE).blending(team);
+        flags.map(|color_alone| rasterizing_backward(team, color_alone)).into_iter().chain([rasterizing])
+    });
+    cells.chain(teams).chain(flags.map(projecting_backward)).chain([CELL_COUNTS.into()]).collect()
 }
 
 /// A kernel of Gaussians that counts or lists cells.
@@ -139,8 +156,19 @@ fn by_cells(shader: Shader, cell: u32) -> Kernel {
     Kernel::new(shader).constant("CELL", cell)
 }
 
-fn projecting(cell: u32) -> Kernel {
-    by_cells(PROJECT, cell).constant("DEPTH_BITS", DEPTH_BITS).constant("ALIGNMENT", PLACE_ALIGNMENT as u32)
+fn projecting(cell: u32, logarithms: bool) -> Kernel {
+    let kernel = by_cells(PROJECT, cell).constant("LOGARITHMS", logarithms.into());
+    kernel.constant("DEPTH_BITS", DEPTH_BITS).constant("ALIGNMENT", PLACE_ALIGNMENT as u32)
+}
+
+fn projecting_backward(logarithms: bool) -> Kernel {
+    let kernel = Kernel::new(PROJECT_BACKWARD).constant("LOGARITHMS", logarithms.into());
+    kernel.constant("BOUND_REACHED", bound_reached().to_bits())
+}
+
+/// `color_alone`: alpha and depth have no gradient.
+fn rasterizing_backward(team: Team, color_alone: bool) -> Kernel {
+    Kernel::new(RASTERIZE_BACKWARD).blending(team).constant("COLOR_ALONE", color_alone.into())
 }
 
 fn project(gpu: &Gpu, frame: &Frame, inputs: &InputBuffers) -> Result<[Handle; 3], GpuError> {
@@ -148,7 +176,7 @@ fn project(gpu: &Gpu, frame: &Frame, inputs: &InputBuffers) -> Result<[Handle; 3
     // Splats, keys in the order of depths, radii.
     let layout = Places::new(&[16 * count, count, count]);
     let projected = gpu.allocate("splats", layout.total)?;
-    Launch::new(&gpu.client, projecting(frame.team.cell))
+    Launch::new(&gpu.client, projecting(frame.team.cell, frame.logarithms))
         .reads(&inputs.means)
         .reads(&inputs.quats)
         .reads(&inputs.scales)
@@ -200,8 +228,8 @@ fn intersect(gpu: &Gpu, frame: &Frame, splats: Handle, depth_keys: &Handle) -> R
     Ok(Intersections { splats, total, count, first_of_gaussian, gaussians, order, starts })
 }
 
-fn rasterize(gpu: &Gpu, frame: &Frame, lists: &Intersections) -> Result<Handle, GpuError> {
-    let rendering = gpu.allocate("image", CHANNELS * frame.pixels())?;
+fn rasterize(gpu: &Gpu, frame: &Frame, lists: &Intersections) -> Result<Arena, GpuError> {
+    let rendering = Arena::new(gpu, "image", &frame.values())?;
     let chunks = frame.chunks(lists.count);
     for chunk in 0..chunks {
         Launch::new(&gpu.client, Kernel::new(RASTERIZE).blending(frame.team))
@@ -209,7 +237,7 @@ fn rasterize(gpu: &Gpu, frame: &Frame, lists: &Intersections) -> Result<Handle, 
             .reads(&lists.order)
             .reads(&lists.gaussians)
             .reads(&lists.splats)
-            .updates_if(chunk > 0, &rendering)
+            .updates_if(chunk > 0, &rendering.buffer)
             .uniform(&frame.uniform(chunk, chunks))
             .groups(frame.cells())?;
     }
@@ -230,13 +258,14 @@ pub(in crate::ops) struct Begun {
 pub(in crate::ops) fn begin(gpu: &Gpu, inputs: SplatInputs<CubeBackend>, view: SplatView) -> Result<Begun, GpuError> {
     let inputs = inputs.into_array();
     let shapes = inputs.each_ref().map(|tensor| tensor.shape());
-    let SplatView { view, room, .. } = view;
+    let SplatView { view, room, logarithms, .. } = view;
     let frame = Frame {
         view,
         room,
         team: choose_team(gpu, view.camera.width, view.camera.height)?,
         gaussians: shapes[0][0],
         rest: shapes[5][1],
+        logarithms,
     };
     let [means, quats, scales, opacities, sh_dc, sh_rest, screen_offsets] = inputs.map(buffer_of);
     let inputs = InputBuffers { means, quats, scales, opacities, sh_dc, sh_rest, screen_offsets };
@@ -252,30 +281,51 @@ fn begin_with(gpu: &Gpu, frame: Frame, inputs: InputBuffers, shapes: [Shape; 7])
 fn forward(gpu: &Gpu, begun: Begun) -> Result<(SplatOutputs<CubeBackend>, GpuSplatSaved), GpuError> {
     let Begun { frame, shapes, inputs, intersections, radii } = begun;
     let rendering = rasterize(gpu, &frame, &intersections)?;
-    frame.check(gpu, "the image", &rendering)?;
-    let values = CHANNELS * frame.pixels();
+    frame.check(gpu, "the image", &rendering.buffer)?;
+    let [width, height] = frame.size().map(|side| side as usize);
     let outputs = SplatOutputs {
-        rendering: gpu.tensor(first_words(&rendering, values), Shape::from([values])),
+        image: gpu.tensor(rendering.tensor(0), Shape::from([height, width, 3])),
+        alpha: gpu.tensor(rendering.tensor(1), Shape::from([height, width])),
+        depth: gpu.tensor(rendering.tensor(2), Shape::from([height, width])),
         radii: gpu.int_tensor(first_words(&radii, frame.gaussians), Shape::from([frame.gaussians])),
         intersections: gpu.int_tensor(first_words(&intersections.total, 1), Shape::from([1])),
     };
     Ok((outputs, GpuSplatSaved { frame, shapes, inputs, intersections, rendering }))
 }
 
-fn backward(saved: GpuSplatSaved, upstream: CubeTensor) -> Result<SplatInputs<CubeBackend>, GpuError> {
-    let gpu = Gpu::of(&upstream)?;
-    let upstream = buffer_of(upstream);
+/// The gradients of an image's pixels in one buffer, and whether only those of the color are there.
+fn upstream_of(gpu: &Gpu, frame: &Frame, gradients: OfPixels<CubeBackend>) -> Result<(Handle, bool), GpuError> {
+    let any = gradients.iter().flatten().next().expect("a gradient of image, alpha or depth");
+    let (device, dtype) = (any.device(), any.dtype());
+    match gradients {
+        [Some(image), None, None] => Ok((buffer_of(image), true)),
+        gradients => {
+            let zeros = |count: usize| CubeBackend::float_zeros(Shape::from([count]), &device, dtype.into());
+            let gradients = gradients.into_iter().zip(frame.values());
+            let gradients: Vec<Handle> =
+                gradients.map(|(gradient, count)| buffer_of(gradient.unwrap_or_else(|| zeros(count)))).collect();
+            Ok((Arena::of(gpu, "gradients of pixels", &gradients, &frame.values())?.buffer, false))
+        }
+    }
+}
+
+fn backward(
+    gpu: &Gpu,
+    saved: GpuSplatSaved,
+    gradients: OfPixels<CubeBackend>,
+) -> Result<SplatInputs<CubeBackend>, GpuError> {
     let GpuSplatSaved { frame, shapes, inputs, intersections: lists, rendering } = saved;
+    let (upstream, color_alone) = upstream_of(gpu, &frame, gradients)?;
     let sums = gpu.allocate("sums of intersections", SUMS * lists.count)?;
     let chunks = frame.chunks(lists.count);
     let carried = gpu.allocate("pixels between chunks", if chunks > 1 { 2 * frame.pixels() } else { 0 })?;
     for chunk in 0..chunks {
-        Launch::new(&gpu.client, Kernel::new(RASTERIZE_BACKWARD).blending(frame.team))
+        Launch::new(&gpu.client, rasterizing_backward(frame.team, color_alone))
             .reads(&lists.starts)
             .reads(&lists.order)
             .reads(&lists.gaussians)
             .reads(&lists.splats)
-            .reads(&rendering)
+            .reads(&rendering.buffer)
             .reads(&upstream)
             .writes(&sums)
             .updates_if(chunk > 0, &carried)
@@ -287,7 +337,7 @@ fn backward(saved: GpuSplatSaved, upstream: CubeTensor) -> Result<SplatInputs<Cu
     let gradients = gpu.allocate("gradients of Gaussians", layout.total)?;
     let mut uniform = frame.uniform(0, 1);
     uniform.extend(layout.starts.iter().map(|start| *start as u32));
-    Launch::new(&gpu.client, PROJECT_BACKWARD)
+    Launch::new(&gpu.client, projecting_backward(frame.logarithms))
         .reads(&inputs.means)
         .reads(&inputs.quats)
         .reads(&inputs.scales)
@@ -298,7 +348,7 @@ fn backward(saved: GpuSplatSaved, upstream: CubeTensor) -> Result<SplatInputs<Cu
         .writes(&gradients)
         .uniform(&uniform)
         .invocations(frame.gaussians)?;
-    frame.check(&gpu, "the gradients of an image", &gradients)?;
+    frame.check(gpu, "the gradients of an image", &gradients)?;
     let mut k = 0;
     Ok(SplatInputs::from_array(shapes.map(|shape| {
         k += 1;
@@ -314,8 +364,10 @@ impl SplatKernels for CubeBackend {
         drawn.unwrap_or_else(|error| error.raise())
     }
 
-    fn splat_backward(saved: GpuSplatSaved, gradient: CubeTensor) -> SplatInputs<Self> {
-        backward(saved, gradient).unwrap_or_else(|error| error.raise())
+    fn splat_backward(saved: GpuSplatSaved, gradients: OfPixels<Self>) -> SplatInputs<Self> {
+        let any = gradients.iter().flatten().next().expect("a gradient of image, alpha or depth");
+        let gpu = Gpu::of(any);
+        gpu.and_then(|gpu| backward(&gpu, saved, gradients)).unwrap_or_else(|error| error.raise())
     }
 }
 
@@ -324,13 +376,15 @@ impl<B: FusionBackend + SplatKernels> SplatKernels for Fusion<B> {
 
     fn splat_forward(inputs: SplatInputs<Self>, view: SplatView) -> (SplatOutputs<Self>, B::Saved) {
         let (outputs, saved) = B::splat_forward(resolve_inputs::<B>(inputs), view);
-        let SplatOutputs { rendering, radii, intersections } = outputs;
+        let SplatOutputs { image, alpha, depth, radii, intersections } = outputs;
+        let [image, alpha, depth] = [image, alpha, depth].map(leaf::<B>);
         let [radii, intersections] = [radii, intersections].map(int_leaf::<B>);
-        (SplatOutputs { rendering: leaf::<B>(rendering), radii, intersections }, saved)
+        (SplatOutputs { image, alpha, depth, radii, intersections }, saved)
     }
 
-    fn splat_backward(saved: B::Saved, gradient: FloatTensor<Self>) -> SplatInputs<Self> {
-        let gradients = B::splat_backward(saved, resolve::<B>(gradient)).into_array();
+    fn splat_backward(saved: B::Saved, gradients: OfPixels<Self>) -> SplatInputs<Self> {
+        let gradients = gradients.map(|gradient| gradient.map(resolve::<B>));
+        let gradients = B::splat_backward(saved, gradients).into_array();
         SplatInputs::from_array(gradients.map(leaf::<B>))
     }
 }
@@ -342,6 +396,7 @@ pub(in crate::ops) fn resolve_inputs<B: FusionBackend>(inputs: SplatInputs<Fusio
 
 #[cfg(test)]
 mod tests {
+    use burn_wgpu::CubeTensor;
     use glam::Vec3;
     use light4gs_data::Camera;
 
@@ -368,21 +423,25 @@ mod tests {
         };
         let [means, quats, scales, opacities, sh_dc, sh_rest, screen_offsets] =
             std::array::from_fn(|k| upload(widths[k] * COUNT, ranges[k]));
-        let upstream = upload(CHANNELS * (SIZE[0] * SIZE[1]) as usize, (-1.0, 1.0));
+        let pixels = (SIZE[0] * SIZE[1]) as usize;
+        let upstream = [3, 1, 1].map(|channels| upload(channels * pixels, (-1.0, 1.0)));
         let inputs = InputBuffers { means, quats, scales, opacities, sh_dc, sh_rest, screen_offsets };
         let camera = Camera::look_at(Vec3::new(0.0, -4.0, 0.5), Vec3::ZERO, Vec3::Z, 0.7, SIZE[0], SIZE[1]);
         let view = View { camera, background: [0.1, 0.5, 0.9], sh_degree: 3 };
         let shapes = widths.map(|width| Shape::from([COUNT, width]));
-        let frame = Frame { view, team, gaussians: COUNT, rest: 15, room };
+        let frame = Frame { view, team, gaussians: COUNT, rest: 15, room, logarithms: false };
         let (outputs, saved) = forward(gpu, begin_with(gpu, frame, inputs, shapes).unwrap()).unwrap();
-        let values = outputs.rendering.shape().num_elements();
         let count = gpu.read_word("intersections", &outputs.intersections.handle).unwrap();
-        let gradients = backward(saved, gpu.tensor(upstream, Shape::from([values]))).unwrap().into_array();
+        let upstream = upstream.map(|handle| {
+            let values = handle.size() as usize / 4;
+            Some(gpu.tensor(handle, Shape::from([values])))
+        });
+        let gradients = backward(gpu, saved, upstream).unwrap().into_array();
         let read = |tensor: CubeTensor| {
             let bytes = gpu.client.read_one(tensor.handle).unwrap();
             bytes.as_chunks::<4>().0.iter().map(|bytes| f32::from_le_bytes(*bytes)).collect()
         };
-        let values = std::iter::once(outputs.rendering).chain(gradients).map(read).collect();
+        let values = [outputs.image, outputs.alpha, outputs.depth].into_iter().chain(gradients).map(read).collect();
         (values, count as usize)
     }
 

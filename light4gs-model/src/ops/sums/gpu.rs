@@ -7,7 +7,7 @@ use burn_wgpu::{CubeBackend, CubeTensor};
 use cubecl::server::Handle;
 
 use super::{SumsOps, sums};
-use crate::gpu::{Arena, Gpu, PACKED, batches, buffer_of};
+use crate::gpu::{Arena, Gpu, PACKED_BUFFERS, batches, buffer_of};
 use crate::gpu_error::GpuError;
 use crate::ops::fusion::{leaves, resolve_all};
 use crate::ops::sample::{GpuOperation, Numbers};
@@ -27,8 +27,8 @@ fn sums_of(parts: Vec<CubeTensor>, numbers: Vec<usize>) -> Result<Vec<CubeTensor
     }
     let lengths: Vec<usize> = shapes.iter().map(|shape| shape.num_elements()).collect();
     for (list, length) in lists.iter_mut().zip(&lengths) {
-        while list.len() > PACKED {
-            let first: Vec<Handle> = list.drain(..PACKED).collect();
+        while list.len() > PACKED_BUFFERS {
+            let first: Vec<Handle> = list.drain(..PACKED_BUFFERS).collect();
             list.insert(0, Arena::of_sums(&gpu, "sums", &[&first], &[*length])?.tensor(0));
         }
     }

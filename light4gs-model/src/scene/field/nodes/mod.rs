@@ -26,7 +26,6 @@ mod trajectory;
 mod weights;
 
 use std::collections::BTreeMap;
-use std::ops::Range;
 
 use burn::module::{Module, Param};
 use burn::tensor::{Device, Tensor, TensorData};
@@ -38,11 +37,10 @@ pub use affinity::AFFINITY;
 pub use lifetime::LIFETIME;
 
 use super::{DeformationField, FinePosition, LearningRate, Moment, SceneAtRest, ScenePoints};
-use crate::ops::columns::columns;
 use crate::ops::node_poses::{NodeParameters, pose};
 use crate::ops::node_regularizer::{Regularization, regularize};
 pub use crate::ops::skinning::MOST_AFFINITIES;
-use crate::ops::skinning::{SkinningInputs, skin};
+use crate::ops::skinning::{Moved, SkinningInputs, skin};
 use crate::planes::FeaturePlanes;
 use crate::scene::{Attribute, GaussianTensors, ModelError};
 
@@ -178,8 +176,8 @@ impl NodesField {
         }
     }
 
-    /// Moved positions and quaternions `[N, 7]`, from the nodes `[B, 20 + H]` at a time.
-    fn skinned(&self, canonical: &GaussianTensors, nodes: Tensor<2>) -> Tensor<2> {
+    /// Moved positions and quaternions, from the nodes `[B, 20 + H]` at a time.
+    fn skinned(&self, canonical: &GaussianTensors, nodes: Tensor<2>) -> Moved {
         let stillness = canonical.further(STILLNESS).cloned();
         let stillness = stillness
             .unwrap_or_else(|| Tensor::full([canonical.means.dims()[0], 1], NEVER_STILL, &canonical.means.device()));
@@ -217,13 +215,12 @@ impl DeformationField for NodesField {
 
     /// Weights take positions as constants: a Gaussian does not move only to follow another node.
     fn deform(&self, canonical: GaussianTensors, _: ScenePoints<'_>, time: f32) -> GaussianTensors {
-        let moved = self.skinned(&canonical, pose(self.parameters(), time));
-        let part = |range: Range<usize>| columns(moved.clone(), range);
+        let Moved { means, quats } = self.skinned(&canonical, pose(self.parameters(), time));
         let opacity_logits = match canonical.further(LIFETIME) {
             Some(lifetime) if self.fades => lifetime::faded(&canonical.opacity_logits, lifetime.clone(), time),
             _ => canonical.opacity_logits.clone(),
         };
-        GaussianTensors { means: part(0..3), quats: part(3..7), opacity_logits, ..canonical }
+        GaussianTensors { means, quats, opacity_logits, ..canonical }
     }
 
     fn begin_motion(&mut self, scene: &SceneAtRest<'_>, position: &FinePosition) {

@@ -43,7 +43,7 @@ impl NodesField {
             }
             let quats = tensor(quats, [nodes, QUATERNION.len()], &device);
             let posed = at_rest.clone().slice_assign(s![.., QUATERNION], quats);
-            self.skinned(&unturned, posed).slice(s![.., 3..7])
+            self.skinned(&unturned, posed).quats
         };
         let mut columns = Vec::new();
         let mut still = None;
