@@ -32,8 +32,8 @@ fn quad_rows(own: OwnPixels, quad: u32) -> vec4<f32> {
     return f32(own.first_y) + f32(ROW_STEP) * (vec4<f32>(0.0, 1.0, 2.0, 3.0) + f32(4u * quad));
 }
 
-// The chunk of the cell's list that this launch blends: at most CHUNK splats.
+// The chunk of the cell's list that this launch blends.
 fn chunk_of(start: u32, end: u32) -> vec2<u32> {
-    let first = min(start + view.cells.z * CHUNK, end);
-    return vec2<u32>(first, min(first + CHUNK, end));
+    let first = min(start + view.cells.z * view.pixels.z, end);
+    return vec2<u32>(first, min(first + view.pixels.z, end));
 }

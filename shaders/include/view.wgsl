@@ -18,6 +18,6 @@ struct View {
     cells: vec4<u32>,
     // Gaussians, active SH degree, coefficients of `sh_rest` for each Gaussian, intersections that there is room for.
     counts: vec4<u32>,
-    // Where alpha and depth begin in an image, behind its color.
+    // Where alpha and depth begin in an image, behind its color; splats of a chunk.
     pixels: vec4<u32>,
 }

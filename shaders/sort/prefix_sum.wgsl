@@ -1,13 +1,15 @@
-// Exclusive prefix sum, in place. STEP says which of three launches this is:
+// Exclusive prefix sum, in place. STEP says which of four launches this is:
 //
 //   0: a workgroup owns a block of BLOCK values and writes their sum to `sums`;
 //   1: a workgroup, the only one, replaces `values` by their prefix sums and writes the total to `sums[0]`;
-//   2: a workgroup owns a block and replaces it by its prefix sums, on top of the block's entry of `sums`.
+//   2: a workgroup owns a block and replaces it by its prefix sums, on top of the block's entry of `sums`;
+//   3: the same, on top of the sum of the entries of all blocks before it. The last block writes the total to `sums[total_at]`.
 //
-// With few values only launch 1 is needed. Many values need 0, then 1 over the sums, then 2.
+// Few values need only launch 1, more of them 0 and 3, and very many 0, then 1 over the sums, then 2.
 
 struct Parameters {
     count: u32,
+    total_at: u32,
 }
 
 @group(0) @binding(0) var<storage, read_write> values: array<u32>;
@@ -77,6 +79,15 @@ fn main(
         }
         return;
     }
+    var start = 0u;
+    if (STEP == 3u) {
+        var before = 0u;
+        for (var other = lane; other < block; other += WORKGROUP) {
+            before += sums[other];
+        }
+        scan_totals(before, lane);
+        start = totals[WORKGROUP - 1u];
+    }
     let first = block * BLOCK + lane * EACH;
     let own = sum_of_own(first);
     scan_totals(own, lane);
@@ -87,7 +98,12 @@ fn main(
         if (lane == 0u) {
             sums[block] = totals[WORKGROUP - 1u];
         }
-    } else {
-        replace_own(first, sums[block] + totals[lane] - own);
+        return;
     }
+    if (STEP == 2u) {
+        start = sums[block];
+    } else if (lane == 0u && (block + 1u) * BLOCK >= parameters.count) {
+        sums[parameters.total_at] = start + totals[WORKGROUP - 1u];
+    }
+    replace_own(first, start + totals[lane] - own);
 }

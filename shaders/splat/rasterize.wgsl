@@ -9,7 +9,7 @@
 //
 // Reads the cell's range in `order` (the numbers of intersections by cell) and `gaussians` (their Gaussians). Writes
 // `rendering`: color over the background [H, W, 3], then alpha [H, W], then depth [H, W]. Between two chunks of a list
-// (see CHUNK) the image holds the sums so far, and, in place of alpha, T, which is negative where the pixel has
+// (see `chunk_of`) the image holds the sums so far, and, in place of alpha, T, which is negative where the pixel has
 // stopped.
 
 // #include arithmetic, view, pixels, footprint

@@ -34,6 +34,12 @@ impl Gpu {
         if self.is_mesas_software() { 60_000 } else { u32::MAX as usize }
     }
 
+    /// Splats of a cell's list that one launch blends. Each round of a loop over them and over the teams that fetch them counts for
+    /// Mesa's software driver ([`Gpu::longest_loop`]). Elsewhere a graphics driver may stop a launch that runs for seconds.
+    pub(crate) fn longest_list(&self) -> usize {
+        if self.is_mesas_software() { 56_000 } else { 1 << 20 }
+    }
+
     /// Whether this is Mesa's software driver.
     pub(crate) fn is_mesas_software(&self) -> bool {
         self.client.properties().identity.physical.is_none()

@@ -8,7 +8,7 @@ use light4gs_codec::rendering::{DILATION, MAX_ALPHA, MAX_LOGARITHM, MIN_ALPHA, M
 use light4gs_render::INVALID_RADIUS;
 use light4gs_shaders::Shader;
 
-use super::team::{CHUNK, Communication, Team};
+use super::team::{Communication, Team};
 
 /// Default number of invocations of a workgroup.
 const WORKGROUP: u32 = 64;
@@ -49,10 +49,7 @@ impl Kernel {
     /// A kernel that blends: the workgroup is a team.
     pub(crate) fn blending(mut self, team: Team) -> Self {
         self.team = Some(team.communication);
-        self.workgroup(team.members)
-            .constant("TEAM", team.members)
-            .constant("CELL", team.cell)
-            .constant("CHUNK", CHUNK as u32)
+        self.workgroup(team.members).constant("TEAM", team.members).constant("CELL", team.cell)
     }
 
     /// The file in `shaders/`, without its ending.

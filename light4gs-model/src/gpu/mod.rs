@@ -26,7 +26,6 @@ pub use kernel::Kernel;
 pub(crate) use launch::Launch;
 pub use recording::{RecordedBuffer, RecordedLaunch, record};
 pub(crate) use subgroups::choose_team;
-pub(crate) use team::CHUNK;
 pub use team::{Communication, Team, with_team};
 
 /// The kernels that several operations launch.

@@ -3,7 +3,7 @@
 use cubecl::server::Handle;
 use light4gs_shaders::{PREFIX_SUM, RADIX_COUNT, RADIX_SCATTER, RANGES, Shader};
 
-use super::context::{Gpu, words};
+use super::context::{Gpu, PLACE_ALIGNMENT, words};
 use super::kernel::Kernel;
 use super::launch::Launch;
 use crate::gpu_error::GpuError;
@@ -12,6 +12,8 @@ use crate::gpu_error::GpuError;
 const SUM_BLOCK: usize = 2048;
 /// Values up to which one workgroup is as fast as three launches.
 const SUM_ALONE: usize = 8 * SUM_BLOCK;
+/// Most workgroups that each add up the sums of those before it.
+const SUMS_ALONE: usize = 1024;
 /// Keys of one workgroup of the sort.
 const SORT_BLOCK: usize = 1024;
 /// Invocations of such a workgroup, each with a counter for every digit: 16 KiB of workgroup memory.
@@ -19,14 +21,14 @@ const SORT_GROUP: u32 = 32;
 const RADIX_BITS: u32 = 7;
 /// Most blocks that each add up the entries that they need of a pass's table. With more blocks that would be too many
 /// reads, so prefix sums replace the table first.
-const BLOCKS_ALONE: usize = 128;
+const BLOCKS_ALONE: usize = 256;
 /// Passes over the widest keys.
 const MOST_PASSES: u32 = u32::BITS.div_ceil(RADIX_BITS);
 
 /// The kernels of this file.
 pub(super) fn kernels() -> Vec<Kernel> {
     let flags = [false, true];
-    let sums = (0..3).map(summing);
+    let sums = (0..4).map(summing);
     let scattering = flags.into_iter().flat_map(move |summed| {
         flags.into_iter().flat_map(move |first| flags.map(|last| Scattering { summed, first, last }.kernel()))
     });
@@ -66,18 +68,25 @@ impl Scattering {
 
 /// Replaces `count` words by their exclusive prefix sums. Returns a buffer that holds the total.
 pub(crate) fn prefix_sum(gpu: &Gpu, values: &Handle, count: usize) -> Result<Handle, GpuError> {
+    let blocks = count.div_ceil(SUM_BLOCK);
+    // Behind the sums of the blocks, where it can be bound.
+    let total_at = blocks.next_multiple_of(PLACE_ALIGNMENT);
     let step = |step: u32, values: &Handle, sums: &Handle, count: usize| {
-        let launch = Launch::new(&gpu.client, summing(step)).updates(values).updates(sums).uniform(&[count as u32]);
-        launch.groups(if step == 1 { 1 } else { count.div_ceil(SUM_BLOCK) })
+        let launch = Launch::new(&gpu.client, summing(step)).updates(values).updates(sums);
+        let groups = if step == 1 { 1 } else { count.div_ceil(SUM_BLOCK) };
+        launch.uniform(&[count as u32, total_at as u32]).groups(groups)
     };
     let total = gpu.allocate("total of a prefix sum", 1)?;
     if count <= SUM_ALONE {
         step(1, values, &total, count)?;
         return Ok(total);
     }
-    let blocks = count.div_ceil(SUM_BLOCK);
-    let sums = gpu.allocate("sums of blocks", blocks)?;
+    let sums = gpu.allocate("sums of blocks", total_at + 1)?;
     step(0, values, &sums, count)?;
+    if blocks <= SUMS_ALONE {
+        step(3, values, &sums, count)?;
+        return Ok(words(&sums, total_at, 1));
+    }
     step(1, &sums, &total, blocks)?;
     step(2, values, &sums, count)?;
     Ok(total)
@@ -164,12 +173,30 @@ mod tests {
         bytes.as_chunks::<4>().0.iter().map(|bytes| u32::from_le_bytes(*bytes)).take(count).collect()
     }
 
+    /// By one workgroup, by two launches, by three.
+    #[test]
+    fn prefix_sums_of_few_and_many_values() {
+        let gpu = default_gpu();
+        for count in [1, SUM_ALONE, SUM_ALONE + 1, 5 * SUM_ALONE, SUMS_ALONE * SUM_BLOCK + 1] {
+            let values: Vec<u32> = (0..count as u32).map(|i| i * 7 % 5).collect();
+            let handle = upload(&gpu, &values);
+            let total = prefix_sum(&gpu, &handle, count).unwrap();
+            let mut sum = 0;
+            let mut expected = values.iter().map(|value| {
+                sum += value;
+                sum - value
+            });
+            assert!(read(&gpu, &handle, count).into_iter().eq(expected.by_ref()), "{count} values");
+            assert_eq!(read(&gpu, &total, 1), [sum], "{count} values");
+        }
+    }
+
     /// Few blocks and many, one pass and several, keys that are equal.
     #[test]
     fn keys_are_sorted_and_equal_ones_keep_their_order() {
         let gpu = default_gpu();
         let mut state = 1u32;
-        for (count, bits) in [(0, 7), (1, 28), (1000, 7), (5000, 10), (70_001, 28), (150_000, 10)] {
+        for (count, bits) in [(0, 7), (1, 28), (1000, 7), (5000, 10), (70_001, 28), (300_000, 10)] {
             let keys: Vec<u32> = (0..count)
                 .map(|_| {
                     state = state.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);

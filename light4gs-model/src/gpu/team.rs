@@ -4,10 +4,6 @@ use std::cell::Cell;
 
 use light4gs_shaders::team::{AGREED, SUBGROUP, SUM_OF_FEW, SUM_OF_MANY, TRUSTED, WORKGROUP};
 
-/// Intersections of a cell that one launch blends. Mesa's software driver ends any loop after 65535 iterations, and a
-/// graphics driver may stop a launch that runs for seconds.
-pub(crate) const CHUNK: usize = 32768;
-
 /// How the members of a team communicate.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum Communication {

@@ -21,9 +21,9 @@ const BLOCK: usize = 2048;
 pub(in crate::ops) const OPERATION: GpuOperation =
     GpuOperation { name: "plane_regularizer", kernels, samples: &[sample] };
 
-/// The kernels of this file. Those of `image_difference` and of `node_regularizer` are launched too.
+/// The kernels of this file. One of `node_regularizer` is launched too.
 fn kernels() -> Vec<Kernel> {
-    vec![kernel()]
+    vec![kernel(), MEAN_OF_SUMS.into()]
 }
 
 fn kernel() -> Kernel {

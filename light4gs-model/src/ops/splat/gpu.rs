@@ -12,9 +12,7 @@ use light4gs_shaders::{CELL_COUNTS, INTERSECT, PROJECT, PROJECT_BACKWARD, RASTER
 
 use super::{OfPixels, SplatInputs, SplatKernels, SplatOutputs, SplatView};
 use crate::gpu::sort::{Sorted, bits_for, prefix_sum, ranges, sort};
-use crate::gpu::{
-    Arena, CHUNK, Gpu, Kernel, Launch, PLACE_ALIGNMENT, Places, Team, buffer_of, choose_team, first_words,
-};
+use crate::gpu::{Arena, Gpu, Kernel, Launch, PLACE_ALIGNMENT, Places, Team, buffer_of, choose_team, first_words};
 use crate::gpu_error::GpuError;
 use crate::ops::activation::bound_reached;
 use crate::ops::fusion::{int_leaf, leaf, resolve};
@@ -37,6 +35,8 @@ pub(in crate::ops) struct Frame {
     room: Option<usize>,
     /// Whether scales are logarithms and opacities logits.
     logarithms: bool,
+    /// Splats of a cell's list that one launch blends.
+    chunk: usize,
 }
 
 impl Frame {
@@ -78,7 +78,7 @@ impl Frame {
             [width, height, width.div_ceil(TILE as u32), height.div_ceil(TILE as u32)],
             [width.div_ceil(side), height.div_ceil(side), chunk as u32, u32::from(chunk + 1 == chunks)],
             [self.gaussians as u32, self.view.sh_degree as u32, self.rest as u32, self.room.unwrap_or(0) as u32],
-            [alpha as u32, depth as u32, 0, 0],
+            [alpha as u32, depth as u32, self.chunk as u32, 0],
         ];
         floats.iter().flatten().map(|value| value.to_bits()).chain(words.into_iter().flatten()).collect()
     }
@@ -91,7 +91,7 @@ impl Frame {
 
     /// The number of launches for the longest possible list: no Gaussian is in a cell's list twice.
     pub(in crate::ops) fn chunks(&self, intersections: usize) -> usize {
-        intersections.min(self.gaussians).div_ceil(CHUNK).max(1)
+        intersections.min(self.gaussians).div_ceil(self.chunk).max(1)
     }
 }
 
@@ -266,6 +266,7 @@ pub(in crate::ops) fn begin(gpu: &Gpu, inputs: SplatInputs<CubeBackend>, view: S
         gaussians: shapes[0][0],
         rest: shapes[5][1],
         logarithms,
+        chunk: gpu.longest_list(),
     };
     let [means, quats, scales, opacities, sh_dc, sh_rest, screen_offsets] = inputs.map(buffer_of);
     let inputs = InputBuffers { means, quats, scales, opacities, sh_dc, sh_rest, screen_offsets };
@@ -407,8 +408,8 @@ mod tests {
     const COUNT: usize = 300;
     const SIZE: [u32; 2] = [50, 37];
 
-    /// Image and gradients of a scene, blended by a team, and the number of its intersections.
-    fn run(gpu: &Gpu, team: Team, room: Option<usize>) -> (Vec<Vec<f32>>, usize) {
+    /// Image and gradients of a scene, blended by a team in chunks of this length, and the number of its intersections.
+    fn run(gpu: &Gpu, team: Team, room: Option<usize>, chunk: usize) -> (Vec<Vec<f32>>, usize) {
         // Any numbers that look random will do.
         let mut state = 1u32;
         let mut uniform = move |low: f32, high: f32| {
@@ -429,7 +430,7 @@ mod tests {
         let camera = Camera::look_at(Vec3::new(0.0, -4.0, 0.5), Vec3::ZERO, Vec3::Z, 0.7, SIZE[0], SIZE[1]);
         let view = View { camera, background: [0.1, 0.5, 0.9], sh_degree: 3 };
         let shapes = widths.map(|width| Shape::from([COUNT, width]));
-        let frame = Frame { view, team, gaussians: COUNT, rest: 15, room, logarithms: false };
+        let frame = Frame { view, team, gaussians: COUNT, rest: 15, room, logarithms: false, chunk };
         let (outputs, saved) = forward(gpu, begin_with(gpu, frame, inputs, shapes).unwrap()).unwrap();
         let count = gpu.read_word("intersections", &outputs.intersections.handle).unwrap();
         let upstream = upstream.map(|handle| {
@@ -449,8 +450,8 @@ mod tests {
     fn every_team_draws_the_same() {
         let gpu = default_gpu();
         let chosen = choose_team(&gpu, SIZE[0], SIZE[1]).unwrap();
-        let (expected, _) = run(&gpu, chosen, None);
-        assert!(expected[0].iter().any(|value| *value > 1.0), "the scene is empty");
+        let (expected, _) = run(&gpu, chosen, None, COUNT);
+        assert!(expected[2].iter().any(|depth| *depth > 1.0), "the scene is empty");
         let mut teams = vec![(32, WorkgroupMemory, 16), (32, WorkgroupMemory, 8), (8, WorkgroupMemory, 8)];
         if chosen.communication != WorkgroupMemory {
             let cells: &[u32] = if chosen.members <= 16 { &[8, 16] } else { &[16] };
@@ -464,12 +465,27 @@ mod tests {
                 continue;
             }
             let team = Team { members, communication, cell };
-            for (k, (found, expected)) in run(&gpu, team, None).0.iter().zip(&expected).enumerate() {
-                let largest = expected.iter().fold(0.0f32, |m, v| m.max(v.abs()));
-                let pairs = found.iter().zip(expected);
-                let error = pairs.map(|(a, b)| (a - b).abs()).fold(0.0, f32::max) / largest;
-                assert!(error < 1e-5, "{members} members, cell {cell}: output {k} is off by {error}");
-            }
+            assert_alike(&run(&gpu, team, None, COUNT).0, &expected, &format!("{members} members, cell {cell}"));
+        }
+    }
+
+    fn assert_alike(found: &[Vec<f32>], expected: &[Vec<f32>], what: &str) {
+        for (k, (found, expected)) in found.iter().zip(expected).enumerate() {
+            let largest = expected.iter().fold(0.0f32, |m, v| m.max(v.abs()));
+            let pairs = found.iter().zip(expected);
+            let error = pairs.map(|(a, b)| (a - b).abs()).fold(0.0, f32::max) / largest;
+            assert!(error < 1e-5, "{what}: output {k} is off by {error}");
+        }
+    }
+
+    /// A list that is longer than a chunk is blended in several launches.
+    #[test]
+    fn long_lists_are_blended_in_chunks() {
+        let gpu = default_gpu();
+        let team = choose_team(&gpu, SIZE[0], SIZE[1]).unwrap();
+        let (expected, _) = run(&gpu, team, None, COUNT);
+        for chunk in [7, 64] {
+            assert_alike(&run(&gpu, team, None, chunk).0, &expected, &format!("chunks of {chunk}"));
         }
     }
 
@@ -478,12 +494,12 @@ mod tests {
     fn room_for_the_lists_changes_nothing_but_the_waiting() {
         let gpu = default_gpu();
         let team = choose_team(&gpu, SIZE[0], SIZE[1]).unwrap();
-        let (expected, count) = run(&gpu, team, None);
+        let (expected, count) = run(&gpu, team, None, COUNT);
         for room in [count, count + 1, 2 * count, 100 * count] {
-            assert_eq!(run(&gpu, team, Some(room)), (expected.clone(), count), "room for {room} of {count}");
+            assert_eq!(run(&gpu, team, Some(room), COUNT), (expected.clone(), count), "room for {room} of {count}");
         }
         for room in [0, 1, count - 1] {
-            assert_eq!(run(&gpu, team, Some(room)).1, count, "room for {room} of {count}");
+            assert_eq!(run(&gpu, team, Some(room), COUNT).1, count, "room for {room} of {count}");
         }
     }
 }
