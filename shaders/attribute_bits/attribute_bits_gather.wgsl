@@ -4,7 +4,7 @@
 // The first 3 C² workgroups own a weight of the prediction each, the next one owns the steps, and of the others each invocation owns a
 // number.
 
-// #include attributes, attribute_bits, workgroup_sum
+// #include attributes, attribute_bits
 
 @group(0) @binding(0) var<storage, read_write> numbers: array<f32>;
 @group(0) @binding(1) var<storage, read_write> prediction: array<f32>;
@@ -14,6 +14,8 @@
 // Gradients of the numbers, then of the rest.
 @group(0) @binding(5) var<storage, read_write> gradients: array<f32>;
 @group(0) @binding(6) var<uniform> parameters: Parameters;
+
+var<workgroup> partial: array<f32, WORKGROUP>;
 
 fn of_number(input: u32, m: u32) -> f32 {
     let channels = parameters.channels;
@@ -62,15 +64,25 @@ fn main(
     if (owner < weights) {
         let channel = owner / inputs;
         let input = owner % inputs;
-        var sum = 0.0;
-        if (predicts(input, channel)) {
-            for (var m = lane; m < count; m += WORKGROUP) {
-                sum -= of_channels[channel * count + m] * numbers[input * count + m];
+        let place = parameters.starts.x + owner;
+        if (!predicts(input, channel)) {
+            if (lane == 0u) {
+                gradients[place] = 0.0;
             }
+            return;
         }
-        let total = workgroup_sum(sum, lane);
+        var sum = 0.0;
+        for (var m = lane; m < count; m += WORKGROUP) {
+            sum -= of_channels[channel * count + m] * numbers[input * count + m];
+        }
+        partial[lane] = sum;
+        workgroupBarrier();
         if (lane == 0u) {
-            gradients[parameters.starts.x + owner] = total;
+            var total = 0.0;
+            for (var k = 0u; k < WORKGROUP; k++) {
+                total += partial[k];
+            }
+            gradients[place] = total;
         }
     } else if (owner == weights) {
         for (var place = lane; place < parameters.steps; place += WORKGROUP) {
