@@ -22,7 +22,8 @@ keys! {
         times: usize = 12; Whole { least: 1, most: 1_000_000 }, "ours";
         /// The first window stays as it is until this share of the fine stage's iterations after the survey is over.
         held: f64 = 0.07; SHARE, "ours";
-        /// The window holds all times when this share of the fine stage's iterations after the survey is over.
+        /// A share of the iterations between the survey and the end of the fine stage. When this share is over, the window
+        /// holds all times.
         open: f64 = 0.6; SHARE, "ours";
         /// Share of the drawn frames that have the newest times, while the window widens.
         newest: f64 = 0.3; SHARE, "ours";
