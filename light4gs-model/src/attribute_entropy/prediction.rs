@@ -4,6 +4,7 @@ use burn::module::{Module, Param};
 use burn::tensor::{Device, Tensor};
 use light4gs_codec::attributes::{CodingOrder, NEIGHBORS, least_squares};
 
+use crate::ops::attribute_bits::prediction_inputs;
 use crate::ops::linear::linear;
 
 /// Added to the normal equations for each Gaussian, in units of a channel's variance.
@@ -81,11 +82,7 @@ impl ChannelPrediction {
 
     /// The columns of the weights of a channel.
     fn inputs(&self, channel: usize) -> Vec<usize> {
-        let channels = self.before.len();
-        let first = channel - self.before[channel];
-        let own = first..channel;
-        let around = channels + first..=channels + channel;
-        own.chain(around).chain([2 * channels + channel]).collect()
+        prediction_inputs(channel - self.before[channel], channel, self.before.len()).collect()
     }
 
     /// 1 for the weights that may be used, `[C, 3 C]`.

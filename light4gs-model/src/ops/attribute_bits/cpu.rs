@@ -4,7 +4,7 @@ use burn::backend::TensorMetadata;
 use burn::backend::tensor::FloatTensor;
 
 use super::cpu_mixture::{MixtureSlices, bits_of_slices, mixture_bits_backward};
-use super::{AttributeBitsKernels, AttributeBitsTensors, CountedBits, INPUTS, PositionSet};
+use super::{AttributeBitsKernels, AttributeBitsTensors, CountedBits, INPUTS, PositionSet, prediction_inputs};
 use crate::ops::for_cpu_back_ends;
 use crate::ops::host::{HostBackend, HostTensor};
 
@@ -15,6 +15,8 @@ pub struct CpuSaved<T> {
     numbers: T,
     /// `[C, 3 C]`: the weights of the prediction that are used, and zeros.
     weights: T,
+    /// `[C, 3 C]`: 1 for those that are used.
+    mask: T,
     residuals: HostTensor,
     /// Weight logits, means and logarithms of scales, `[C, K]` each.
     mixtures: [HostTensor; 3],
@@ -24,10 +26,6 @@ pub struct CpuSaved<T> {
 }
 
 impl<T> CpuSaved<T> {
-    fn channels(&self) -> usize {
-        self.counted.attributes.last().map_or(0, |attribute| attribute.channels.end)
-    }
-
     /// The widths of the intervals around the residuals of each channel.
     fn widths(&self) -> Vec<f32> {
         let steps = self.steps.as_slice();
@@ -44,7 +42,8 @@ impl<T> CpuSaved<T> {
 fn mask(counted: &CountedBits, channels: usize) -> Vec<f32> {
     let mut mask = vec![0.0; channels * 3 * channels];
     for (channel, attribute) in counted.by_channel() {
-        attribute.inputs(channel, channels).for_each(|input| mask[channel * 3 * channels + input] = 1.0);
+        let inputs = prediction_inputs(attribute.channels.start, channel, channels);
+        inputs.for_each(|input| mask[channel * 3 * channels + input] = 1.0);
     }
     mask
 }
@@ -85,11 +84,12 @@ fn forward<B: HostBackend>(
     let ([numbers, prediction, log_steps, weight_logits, means, log_scales], factors) = tensors.into_parts();
     let channels = prediction.shape()[0];
     let mask = B::from_values(mask(&counted, channels), [channels, 3 * channels]);
-    let weights = B::float_mul(prediction, mask);
+    let weights = B::float_mul(prediction, mask.clone());
     let saved = CpuSaved {
         residuals: residuals_of::<B>(&numbers, &weights),
         numbers,
         weights,
+        mask,
         mixtures: [weight_logits, means, log_scales].map(B::to_host),
         steps: B::to_host(B::float_exp(log_steps)),
         factors: B::to_host(factors),
@@ -113,7 +113,7 @@ fn backward<B: HostBackend>(saved: CpuSaved<FloatTensor<B>>, gradient: FloatTens
     let upstream = B::to_host(gradient);
     let upstream = upstream.as_slice();
     let CountedBits { positions, bound, share, weight, .. } = &saved.counted;
-    let (channels, count) = (saved.channels(), saved.numbers.shape()[1]);
+    let (channels, count) = (saved.weights.shape()[0], saved.numbers.shape()[1]);
     let (steps, factors) = (saved.steps.as_slice(), saved.factors.as_slice());
     let of_bits: Vec<f32> = (saved.counted.by_channel().zip(&upstream[1..]))
         .map(|((_, attribute), upstream)| upstream * weight * share * factors[attribute.place])
@@ -151,7 +151,7 @@ fn of_residuals<B: HostBackend>(
     of_residuals: Vec<f32>,
     [channels, count]: [usize; 2],
 ) -> [FloatTensor<B>; 2] {
-    let CpuSaved { numbers, weights, counted, .. } = saved;
+    let CpuSaved { numbers, weights, mask, .. } = saved;
     if count == 0 {
         let nothing = vec![0.0; channels * 3 * channels];
         return [numbers.clone(), B::from_values(nothing, [channels, 3 * channels])];
@@ -164,8 +164,7 @@ fn of_residuals<B: HostBackend>(
         *of_number += of_residual;
     }
     let of_weights = B::float_transpose(B::float_matmul(numbers.clone(), by_gaussian));
-    let mask = B::from_values(mask(counted, channels), [channels, 3 * channels]);
-    [B::from_host(of_numbers), B::float_mul(of_weights, mask)]
+    [B::from_host(of_numbers), B::float_mul(of_weights, mask.clone())]
 }
 
 for_cpu_back_ends! {

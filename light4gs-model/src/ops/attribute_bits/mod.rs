@@ -31,14 +31,12 @@ pub struct AttributeChannels {
     pub place: usize,
 }
 
-impl AttributeChannels {
-    /// The rows of the numbers `[3 C, M]` from which a channel of this attribute is predicted, of `count` channels together: its
-    /// own channels before it, the means of the neighbors' channels up to it, and itself in the nearest neighbor.
-    pub fn inputs(&self, channel: usize, count: usize) -> impl Iterator<Item = usize> {
-        let first = self.channels.start;
-        let (own, around) = (first..channel, count + first..=count + channel);
-        own.chain(around).chain([2 * count + channel])
-    }
+/// The rows of the numbers `[3 C, M]` from which a channel is predicted, of `count` channels together, where `first` is the first
+/// channel of its attribute: the channels of its attribute before it, the means of the neighbors' channels up to it, and itself in the
+/// nearest neighbor. The codec predicts from the same numbers (`light4gs_codec::attributes`).
+pub fn prediction_inputs(first: usize, channel: usize, count: usize) -> impl Iterator<Item = usize> {
+    let (own, around) = (first..channel, count + first..=count + channel);
+    own.chain(around).chain([2 * count + channel])
 }
 
 /// Positions as a set of points in a box.
@@ -180,7 +178,7 @@ pub struct AttributeBitsInputs {
     /// `[3 C, M]`: a column for each Gaussian with its numbers, the means over its neighbors, those of the nearest one, as
     /// [`neighborhoods`](crate::ops::neighborhoods::neighborhoods) finds them.
     pub numbers: Tensor<2>,
-    /// `[C, 3 C]`: weights of the prediction. Those that [`AttributeChannels::inputs`] does not name are not used.
+    /// `[C, 3 C]`: weights of the prediction. Those that [`prediction_inputs`] does not name are not used.
     pub prediction: Tensor<2>,
     /// `[A]`: natural logarithms of the steps.
     pub log_steps: Tensor<1>,

@@ -6,6 +6,7 @@ use burn::tensor::{Device, Int, Tensor, TensorData};
 use light4gs_model::LogisticMixtureConfig;
 use light4gs_model::ops::attribute_bits::{
     AttributeBitsInputs, AttributeChannels, CountedBits, MOST_COMPONENTS, PositionSet, attribute_bits,
+    prediction_inputs,
 };
 use light4gs_model::ops::lower_bound::lower_bound;
 use light4gs_tests::golden::{assert_close, assert_close_relative, cpu_devices, devices, values_of};
@@ -149,7 +150,8 @@ fn plain(inputs: AttributeBitsInputs, case: &Case) -> Tensor<1> {
     let mut used = vec![0.0; channels * 3 * channels];
     let mut places = Vec::new();
     for (channel, attribute) in case.by_channel() {
-        attribute.inputs(channel, channels).for_each(|row| used[channel * 3 * channels + row] = 1.0);
+        let rows = prediction_inputs(attribute.channels.start, channel, channels);
+        rows.for_each(|row| used[channel * 3 * channels + row] = 1.0);
         places.push(attribute.place as i64);
     }
     let used = Tensor::<1>::from_floats(used.as_slice(), &device).reshape([channels, 3 * channels]);
