@@ -34,10 +34,11 @@ impl Gpu {
         if self.is_mesas_software() { 60_000 } else { u32::MAX as usize }
     }
 
-    /// Splats of a cell's list that one launch blends. Each round of a loop over them and over the teams that fetch them counts for
-    /// Mesa's software driver ([`Gpu::longest_loop`]). Elsewhere a graphics driver may stop a launch that runs for seconds.
+    /// Splats of a cell's list that one launch blends. Elsewhere than on Mesa's software driver ([`Gpu::longest_loop`]), a graphics
+    /// driver may stop a launch that runs for seconds. There each splat is a round, and each fetch of eight is two, of the loop
+    /// over the fetches and of the last, empty round over their members: so at most 4/5 of 65535.
     pub(crate) fn longest_list(&self) -> usize {
-        if self.is_mesas_software() { 56_000 } else { 1 << 20 }
+        if self.is_mesas_software() { 52_000 } else { 1 << 20 }
     }
 
     /// Whether this is Mesa's software driver.
