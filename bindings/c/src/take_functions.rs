@@ -164,7 +164,7 @@ pub unsafe extern "C" fn l4gs_take_segment(
 }
 
 /// Decodes what is shown at a time in seconds, so that it is there when it is needed: for a thread that runs ahead of the one
-/// that draws. Nothing happens where no segment is shown. While a segment is decoded, other threads wait that need one too.
+/// that draws. Nothing happens where no segment is shown. Several threads can decode segments at the same time.
 ///
 /// # Safety
 /// `take` is open.
