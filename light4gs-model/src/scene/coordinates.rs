@@ -82,8 +82,7 @@ keys! {
         /// axes, each scaled by the cloud's standard deviation along this axis.
         pca: bool = true; Flag, "paper";
         /// Whether points more than one standard deviation away from the cloud's center are contracted. If off, the
-        /// whole cloud is scaled into the ball of radius 1, inside which contraction changes nothing. This ball is half
-        /// as wide as the planes.
+        /// whole cloud is scaled into the ball of radius 1, which is half as wide as the planes.
         contraction: bool = true; Flag, "paper";
     }
 }

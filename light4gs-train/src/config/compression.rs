@@ -16,8 +16,8 @@ keys! {
         profile: FileProfile = FileProfile::Compact;
             FileProfile::BOUNDS,
             "ours; paper";
-        /// Upper bound of the file's size in bytes. The size comes close to this bound. Training adapts the weight of
-        /// the rate, and the encoder adapts the steps of the attributes. 0 means no bound; then the size follows from
+        /// Upper bound of the file's size in bytes. To come close to this bound, training adapts the weight of the
+        /// rate, and the encoder adapts the steps of the attributes. 0 means no bound; then the size follows from
         /// lambda and the quantization steps.
         target_bytes: usize = 0; Whole { least: 0, most: 1_000_000_000_000 }, "ours";
         /// Lower bound of the PSNR of the decoded file on the test views (on the training views if there are none), in
@@ -84,8 +84,8 @@ keys! {
         /// Whether the rate of the spherical harmonics has a gradient with respect to the harmonics. If off, the
         /// entropy model of the harmonics is trained, but the harmonics are not trained for a low rate.
         sh: bool = true; Flag, "ours, for the ablation";
-        /// Whether the attributes that no other entropy model describes also have quantization noise, a rate and
-        /// learned steps, once densification is over. In scenes of degree 1 or 2, spherical harmonics are among these
+        /// Whether the attributes without an entropy model of their own also get quantization noise, a rate and learned
+        /// steps, once densification is over. In scenes of degree 1 or 2, spherical harmonics are among these
         /// attributes. If off, the encoder searches for the steps of these attributes. Only the `compact` profile
         /// quantizes all of these attributes in the file; the `paper` profile quantizes only the spherical harmonics.
         attributes: bool = false; Flag, "ours, after HAC++";

@@ -16,7 +16,8 @@ choice! {
         Auto = "auto",
         /// The last number in the images' names.
         Number = "number",
-        /// The place of the image's name in the natural order of the names of its camera's images.
+        /// The images of each camera are sorted by name, with numbers in numerical order; the time is the image's place
+        /// in this order.
         Order = "order",
     }
 }

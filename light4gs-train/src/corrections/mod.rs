@@ -64,15 +64,16 @@ keys! {
 
 keys! {
     /// How corrections of exposures, poses and times are learned. The keys that end in `_init` and `_final` are Adam's
-    /// learning rates at the beginning and at the end of a run that looks at each frame or camera a hundred times. If a
-    /// run looks at them less often, its learning rates are larger in proportion, but at most three times as large. If
-    /// a run looks at them more often, its learning rates are smaller in proportion, but at least a fifth as large.
+    /// learning rates at the beginning and at the end of a run that trains on each frame, or on each camera's frames, a
+    /// hundred times. In a run that trains on them less often, the learning rates are larger in proportion, up to three
+    /// times as large. In a run that trains on them more often, the learning rates are smaller in proportion, down to a
+    /// fifth.
     pub struct CorrectionRates {
         /// Poses and times are corrected from this iteration on, since in earlier iterations there is no scene to
         /// compare the frames with. Iterations are counted over both stages.
         from: usize = 300; ITERATION, "ours";
-        /// Learning rate of the logarithms of exposures' gains at the first training step. The offsets of exposures are
-        /// in shares of white, and their learning rate is a quarter of this.
+        /// Learning rate of the logarithms of exposures' gains at the first training step. The offsets of exposures (1
+        /// is white) have a quarter of this learning rate.
         exposure_init: f64 = 2e-2; CORRECTION_RATE, "ours";
         /// Learning rate of exposures at the end of the run.
         exposure_final: f64 = 2e-4; CORRECTION_RATE, "ours";

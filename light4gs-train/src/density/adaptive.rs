@@ -27,7 +27,8 @@ keys! {
     pub struct AdaptiveDensityConfig {
         /// Cloning and splitting start after this iteration.
         from: usize = 500; ITERATION, "3DGS";
-        /// Cloning, splitting and opacity reset end before this iteration.
+        /// Gaussians are cloned, split, and removed as faint, up to and including this iteration. Opacity resets end
+        /// before this iteration.
         until: usize = 15_000; ITERATION, "reference; the paper says 14000";
         /// Number of iterations from one round of cloning and splitting to the next.
         interval: usize = 100; INTERVAL, "reference";
@@ -41,8 +42,8 @@ keys! {
         /// Gaussians whose largest scale is at most this share of the scene's extent are cloned, and larger ones are
         /// split in two.
         percent_dense: f32 = 0.01; Number { least: 1e-9, most: 1e9 }, "3DGS";
-        /// Largest number of Gaussians. At this bound, the Gaussians with the largest gradients are cloned or split
-        /// first.
+        /// Largest number of Gaussians. If cloning and splitting would exceed this bound, only the Gaussians with the
+        /// largest gradients are cloned or split.
         max_gaussians: usize = 360_000; Whole { least: 1, most: MOST_GAUSSIANS }, "reference; the largest first: ours";
         /// Opacity below which a Gaussian counts as faint and is removed, in the coarse stage.
         opacity_threshold: f32 = 0.005; SHARE, "3DGS";

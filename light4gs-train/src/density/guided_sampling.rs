@@ -5,15 +5,15 @@ use light4gs_keys::{INTERVAL, keys};
 
 keys! {
     /// Guided sampling adds Gaussians at those pixels of training frames that the rendering does not explain. Each new
-    /// Gaussian exists only around the time of its frame. Guided sampling is meant for objects that are too fast to be
-    /// followed. Guided sampling needs Gaussians with lifetimes: `model.nodes.lifetime`.
+    /// Gaussian exists only around the time of its frame. Guided sampling is meant for objects that move too fast for
+    /// control nodes to follow. Guided sampling needs Gaussians with lifetimes: `model.nodes.lifetime`.
     pub struct GuidedSamplingConfig {
         /// Iterations of the fine stage after which Gaussians are added; empty = never.
         iterations: Vec<usize> = Vec::new();
             List { element: &INTERVAL, length: None }, "after Li et al. 2024";
-        /// Number of Gaussians that are added for each point of time with training frames, at pixels of one random
-        /// frame of that time. Fewer are added if few pixels are unexplained. With the added Gaussians, there may be
-        /// more Gaussians than `train.densify.adaptive.max_gaussians`.
+        /// Number of Gaussians that are added for each point of time with training frames. They are added at pixels of
+        /// one random frame of that time. Fewer are added if few pixels are unexplained. The bound
+        /// `train.densify.adaptive.max_gaussians` does not apply to the added Gaussians.
         count: usize = 100; Whole { least: 1, most: 1_000_000 }, "ours";
         /// Standard deviation of the added Gaussians' lifetimes. The unit is the mean interval between neighboring
         /// points of time with training frames.

@@ -14,8 +14,8 @@ keys! {
         /// The weight lambda of `1 - SSIM` in the loss. The weight of L1 is `1 - lambda`.
         lambda_dssim: f32 = 0.0; SHARE, "reference";
         /// The loss is the squared difference until this iteration of the fine stage, and in the whole coarse stage. 0
-        /// means never. The reason for the squared difference: L1 is smallest if a pixel has its median color over
-        /// time, and where a fast object passes, this is the color of the background.
+        /// means never. The squared difference is for fast objects: with L1, a pixel tends to its median color over
+        /// time, and where a fast object passes, the median is the color of the background.
         l2_until: usize = 0; ITERATION, "ours";
     }
 }

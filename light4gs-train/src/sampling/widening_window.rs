@@ -20,7 +20,8 @@ keys! {
         center: f64 = 0.5; SHARE, "ours";
         /// Number of different times in the first window.
         times: usize = 12; Whole { least: 1, most: 1_000_000 }, "ours";
-        /// The first window stays as it is until this share of the fine stage's iterations after the survey is over.
+        /// A share of the iterations between the survey and the end of the fine stage. Until this share is over, the
+        /// first window stays as it is.
         held: f64 = 0.07; SHARE, "ours";
         /// A share of the iterations between the survey and the end of the fine stage. When this share is over, the window
         /// holds all times.

@@ -55,8 +55,8 @@ pub(super) struct Export {
     #[arg(long, required_unless_present_any = ["html", "site"])]
     out: Option<PathBuf>,
     /// Kind of the files in the folder. `ply` writes a file for each frame. `glb`, for takes only, writes a file for
-    /// each segment, with the segment's motion and what stands still around it. `glb` also writes `base.glb`, with what
-    /// stands still over the whole take, and `segments.json`, with the times of each segment.
+    /// each segment, with the segment's motion and the still Gaussians that are drawn with it. `glb` also writes
+    /// `base.glb`, with what stands still over the whole take, and `segments.json`, with the times of each segment.
     #[arg(long, value_enum, value_name = "KIND", default_value = "ply")]
     to: FolderOf,
     /// A single time of a take in seconds, for a .ply or .glb file.
@@ -69,8 +69,8 @@ pub(super) struct Export {
     /// A page that plays the scene in a browser without any other file.
     #[arg(long, value_name = "FILE", conflicts_with_all = ["out", "frames", "device", "time", "fps", "z_up", "limits", "at", "base"])]
     html: Option<PathBuf>,
-    /// A folder that any static server shows: the page `index.html`, the player, the file, cameras, and a picture for
-    /// previews of the page's link.
+    /// A folder to write, which any static server can serve: the page `index.html`, the player, the file, cameras, and
+    /// a picture for previews of the page's link.
     #[arg(long, value_name = "DIR", conflicts_with_all = ["html", "out", "frames", "device", "time", "fps", "z_up", "limits", "at", "base"])]
     site: Option<PathBuf>,
     /// The address at which the folder of --site will be. Previews of links need this address to show the picture.

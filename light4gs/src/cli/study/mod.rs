@@ -50,9 +50,9 @@ pub(super) struct Study {
     /// the file is written share one training.
     #[arg(long)]
     out: Option<PathBuf>,
-    /// The preset or TOML file that variants start from, in place of the study's own preset, or of hexplane-dnerf-cpu
-    /// if the study names none; {scene} in this name stands for the scene's name. If a value of an axis of the study
-    /// names a preset of its own, the value keeps that preset.
+    /// The preset or TOML file that variants start from; {scene} in this name stands for the scene's name. By default,
+    /// the preset that the study names, or hexplane-dnerf-cpu if it names none. If a value of an axis of the study
+    /// names a preset of its own, variants with this value start from that preset.
     #[arg(long, value_name = "PRESET|FILE")]
     config: Option<String>,
     /// Factor by which the length of every variant's schedule is multiplied, such as 0.25 for a first look.
@@ -69,8 +69,8 @@ pub(super) struct Study {
     /// and standard deviations.
     #[arg(long, default_value_t = 1, value_parser = clap::value_parser!(u64).range(1..=1000))]
     seeds: u64,
-    /// Folder of another study. If a run of this study would repeat the training of a finished run of that study, that
-    /// training is reused. This option may be given more than once.
+    /// Folder of another study, whose finished trainings are reused. A run is not trained if the other study has a
+    /// finished run with the same training. This option may be given more than once.
     #[arg(long, value_name = "STUDY")]
     reuse: Vec<PathBuf>,
     /// Train only the runs that have these parts, such as 400,small,seed-0, in their names SCENE/VALUE+VALUE/seed-K. If
