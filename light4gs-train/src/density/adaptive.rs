@@ -27,7 +27,7 @@ keys! {
     pub struct AdaptiveDensityConfig {
         /// Cloning and splitting start after this iteration.
         from: usize = 500; ITERATION, "3DGS";
-        /// Gaussians are cloned, split, and removed as faint, up to and including this iteration. Opacity resets end
+        /// Gaussians are cloned, split, and removed for being faint, up to and including this iteration. Opacity resets end
         /// before this iteration.
         until: usize = 15_000; ITERATION, "reference; the paper says 14000";
         /// Number of iterations from one round of cloning and splitting to the next.
