@@ -418,10 +418,10 @@ export class Player extends EventTarget {
       // A draft may leave out Gaussians outside of the image: the image at rest has a list of its own.
       const viewpoint = level > 0 ? { ...this.#viewpoint(), spread: this.#spread() } : this.#viewpoint();
       this.#spare = null;
-      const { list, evaluateMs, sortMs } = await this.scene.frame(time, viewpoint, memory, level);
+      const { list, later, evaluateMs, sortMs } = await this.scene.frame(time, viewpoint, memory, level, true);
       if (this.#disposed) return;
       const start = performance.now();
-      this.renderer.setList(list);
+      this.renderer.setList(list, later);
       this.#spare = /** @type {ArrayBuffer} */ (list.buffer);
       this.timings.upload = performance.now() - start;
       this.timings.sort = sortMs;

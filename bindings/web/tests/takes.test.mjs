@@ -108,7 +108,10 @@ test("joins are played without a pause and without an image that lacks Gaussians
     const draw = renderer.draw.bind(renderer);
     let list = 0;
     const setList = renderer.setList.bind(renderer);
-    renderer.setList = (given) => ((list = given.length / 16), setList(given));
+    renderer.setList = (given, later) => {
+      list = (given.length + (later?.list.length ?? 0)) / 16;
+      setList(given, later);
+    };
     renderer.draw = (...all) => {
       draw(...all);
       const pixels = new Uint8Array(4);
@@ -146,6 +149,40 @@ test("joins are played without a pause and without an image that lacks Gaussians
   await page.context().close();
 });
 
+test("in a fade, the picture is the mean of those with either segment", async () => {
+  serveTake(take, { step: Infinity });
+  const page = await takePage();
+  const { weight, differences, apart } = await page.evaluate(async (view) => {
+    const player = await globalThis.play(await globalThis.load(), { controls: false });
+    const { renderer } = player;
+    let both;
+    const setList = renderer.setList.bind(renderer);
+    renderer.setList = (...given) => {
+      both = given.map((one) => (one.list ? { ...one, list: one.list.slice() } : one.slice()));
+      setList(...given);
+    };
+    // The second segment goes over into the third: both must be there.
+    player.time = 1.5 / player.scene.duration;
+    while (player.scene.segments.decoded.size < 3) await new Promise((resolve) => setTimeout(resolve, 20));
+    const drawn = await player.renderAt(1.98 / player.scene.duration, view);
+    const [earlier, later] = both;
+    const pictures = [earlier, later.list].map((list) => {
+      setList(list);
+      renderer.draw(view, player.background);
+      return renderer.readPixels();
+    });
+    const mean = drawn.map((_, k) => Math.round((1 - later.weight) * pictures[0][k] + later.weight * pictures[1][k]));
+    const differ = (/** @type {Uint8Array} */ one) => one.reduce((most, value, k) => Math.max(most, Math.abs(value - drawn[k])), 0);
+    return { weight: later.weight, differences: differ(mean), apart: pictures.map(differ) };
+  }, view);
+  assert.ok(weight > 0.1 && weight < 0.9, `${weight}`);
+  assert.ok(apart.every((difference) => difference > 20), apart.join());
+  // The canvas rounds twice.
+  assert.ok(differences <= 2, `${differences}`);
+  assert.deepEqual(page.problems, []);
+  await page.context().close();
+});
+
 test("at rest in a fade, the image is drawn again when the other segment comes", async () => {
   serveTake(take);
   const [first] = partsOf(take).segments[2];
@@ -162,7 +199,10 @@ test("at rest in a fade, the image is drawn again when the other segment comes",
     player.camera.take(view);
     player.cameraMoved();
     const setList = player.renderer.setList.bind(player.renderer);
-    player.renderer.setList = (given) => ((globalThis.list = given.length / 16), setList(given));
+    player.renderer.setList = (given, later) => {
+      globalThis.list = (given.length + (later?.list.length ?? 0)) / 16;
+      setList(given, later);
+    };
     globalThis.list = 0;
     // The second segment goes over into the third.
     player.time = 1.98 / player.scene.duration;
@@ -173,8 +213,9 @@ test("at rest in a fade, the image is drawn again when the other segment comes",
   // Base and second segment have 161 Gaussians: one row of the list.
   assert.deepEqual(await shown(), [256, [0, 1]]);
   release();
-  for (let i = 0; i < 50 && (await shown())[0] < 512; i++) await wait(100);
-  assert.equal((await shown())[0], 512);
+  // Two lists: base and third segment take two rows.
+  for (let i = 0; i < 50 && (await shown())[0] < 768; i++) await wait(100);
+  assert.equal((await shown())[0], 768);
   assert.deepEqual(page.problems, []);
   await page.context().close();
 });

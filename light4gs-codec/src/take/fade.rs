@@ -3,9 +3,6 @@
 use super::{SegmentTimes, TakeIndex};
 use crate::network::kernels::{exponential, logarithm};
 
-/// Share of the time around a join that a fade takes, of what both streams cover. A segment is worse towards its ends, and two
-/// at once are worse than the better one.
-const SHARE: f64 = 0.25;
 /// The logits of opacities that are faded lie within ± this number.
 const MOST_LOGIT: f32 = 80.0;
 
@@ -21,15 +18,15 @@ pub struct DrawnSegment {
 impl TakeIndex {
     /// The segments that are drawn at a time in seconds: none in a gap, two around a join, otherwise one.
     ///
-    /// The fade from a segment to one that begins where it ends takes the middle quarter of the time that both streams cover, or of
-    /// the halves of the two segments where those are shorter. A gap, and a join without such a time, has none.
+    /// The fade from a segment to one that begins where it ends takes the time that both streams cover, within the halves of the two
+    /// segments at the join. A gap, and a join without such a time, has none.
     pub fn drawn_at(&self, seconds: f64) -> Vec<DrawnSegment> {
         let Some(segment) = self.segment_at(seconds) else { return Vec::new() };
         let weight_of_later = |earlier: usize| {
             let [from, to] = self.fade(earlier)?;
             (from < seconds && seconds < to).then(|| (seconds - from) / (to - from))
         };
-        // No time is within two fades, as each has at most an eighth of a segment.
+        // No time is within two fades, as none goes beyond the middle of a segment.
         for earlier in [Some(segment), segment.checked_sub(1)].into_iter().flatten() {
             if let Some(later) = weight_of_later(earlier) {
                 let weights = [1.0 - later, later].map(|weight| weight as f32);
@@ -47,7 +44,7 @@ impl TakeIndex {
         (earlier.end == later.begin).then(|| {
             let from = later.stream_begin.max(middle(earlier));
             let to = earlier.stream_end.max(earlier.end).min(middle(later));
-            [from, to].map(|time| later.begin + SHARE * (time - later.begin))
+            [from, to]
         })
     }
 }

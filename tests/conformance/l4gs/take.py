@@ -22,8 +22,6 @@ PRELUDE_BYTES = 44
 ROW_BYTES = 64
 _LONGEST = 1e9
 _CONTEXT_BITS = 6
-# The share of the time around a join, that both streams cover, which a fade takes.
-_FADE = 0.25
 _MOST_LOGIT = 80
 _NAMES = [*(name for name, _ in FIRST_ATTRIBUTES), "sh_rest"]
 
@@ -78,8 +76,8 @@ class Take:
         for earlier, later in zip(self.segments, self.segments[1:]):
             if earlier.times[1] == later.times[0]:
                 join = later.times[0]
-                begin = join + _FADE * (max(later.times[2], _middle(earlier)) - join)
-                end = join + _FADE * (min(max(earlier.times[3], earlier.times[1]), _middle(later)) - join)
+                begin = max(later.times[2], _middle(earlier))
+                end = min(max(earlier.times[3], earlier.times[1]), _middle(later))
                 if begin < seconds < end:
                     weight = (seconds - begin) / (end - begin)
                     return [(earlier, np.float32(1.0 - weight)), (later, np.float32(weight))]

@@ -23,7 +23,10 @@ import { fragmentShader, screenFragmentShader, screenVertexShader, vertexShader 
 const DRAFT_TAIL = 0.1;
 
 export class SplatRenderer {
+  /** Gaussians of the list. */
   #count = 0;
+  /** The list of another picture, behind the first one, and its weight; 0 where there is none. */
+  #later = { count: 0, weight: 0 };
   #rows = 0;
   #indexed = 0;
   #target = "";
@@ -67,6 +70,7 @@ export class SplatRenderer {
   /** Makes everything again after the graphics card has lost it. */
   restore() {
     this.#count = this.#rows = this.#indexed = 0;
+    this.#later = { count: 0, weight: 0 };
     this.#target = "";
     this.parts = this.#make();
   }
@@ -100,23 +104,31 @@ export class SplatRenderer {
     this.gl.flush();
   }
 
-  /** @param {Float32Array} list  what is drawn, as {@link import("../scene/scene.js").Scene.frame} gives it */
-  setList(list) {
+  /**
+   * What is drawn, as {@link import("../scene/scene.js").Scene.frame} gives it.
+   * @param {Float32Array} list
+   * @param {{ list: Float32Array, weight: number } | null} [later]  of another picture, with which that of the list is mixed
+   */
+  setList(list, later = null) {
     const { gl, parts } = this;
-    const rows = list.length / (ENTRY * ROW);
+    const rowsOf = (/** @type {number} */ length) => length / (ENTRY * ROW);
+    const first = rowsOf(list.length);
+    const rows = first + rowsOf(later?.list.length ?? 0);
     this.#count = list.length / ENTRY;
+    this.#later = { count: (later?.list.length ?? 0) / ENTRY, weight: later?.weight ?? 0 };
     if (rows === 0 || gl.isContextLost()) return;
     gl.bindTexture(gl.TEXTURE_2D, parts.list);
     if (rows > this.#rows) {
       const most = gl.getParameter(gl.MAX_TEXTURE_SIZE);
-      if (rows > most) throw new GraphicsError(`${this.#count} Gaussians are more than this graphics card takes (${most * ROW})`);
+      if (rows > most) throw new GraphicsError(`${rows * ROW} Gaussians are more than this graphics card takes (${most * ROW})`);
       // Room for a few more, since their number changes with the view.
       this.#rows = Math.min(Math.ceil(1.2 * rows), most);
       gl.texImage2D(gl.TEXTURE_2D, 0, gl.RGBA32F, 4 * ROW, this.#rows, 0, gl.RGBA, gl.FLOAT, null);
       gl.texParameteri(gl.TEXTURE_2D, gl.TEXTURE_MIN_FILTER, gl.NEAREST);
       gl.texParameteri(gl.TEXTURE_2D, gl.TEXTURE_MAG_FILTER, gl.NEAREST);
     }
-    gl.texSubImage2D(gl.TEXTURE_2D, 0, 0, 0, 4 * ROW, rows, gl.RGBA, gl.FLOAT, list);
+    if (first > 0) gl.texSubImage2D(gl.TEXTURE_2D, 0, 0, 0, 4 * ROW, first, gl.RGBA, gl.FLOAT, list);
+    if (later && rows > first) gl.texSubImage2D(gl.TEXTURE_2D, 0, 0, first, 4 * ROW, rows - first, gl.RGBA, gl.FLOAT, later.list);
     this.#index(this.#rows * ROW);
   }
 
@@ -155,54 +167,78 @@ export class SplatRenderer {
   }
 
   /**
-   * Draws the list that was set, over a background.
+   * Draws the list that was set, over a background; of two lists the mean, by the weight of the later one.
    * @param {View} view
    * @param {ArrayLike<number>} background  red, green, blue in [0, 1]
    * @param {number} [scale]  below 1: a draft with this share of the pixels along each side, in bytes, and enlarged
    */
   draw(view, background, scale = 1) {
-    const { gl, canvas, parts } = this;
+    const { gl, canvas } = this;
     if (gl.isContextLost()) return;
-    const { width, height, rotation, translation } = view;
+    const { width, height } = view;
     const draft = scale < 1;
     const direct = draft ? this.stretched === true : !this.halfFloats;
     const columns = draft ? Math.max(1, Math.round(width * scale)) : width;
     const rows = draft ? Math.max(1, Math.round(height * scale)) : height;
     const size = direct ? { width: columns, height: rows } : { width, height };
     if (canvas.width !== size.width || canvas.height !== size.height) Object.assign(canvas, size);
-    if (!direct) this.#prepareTarget(columns, rows, !draft && this.halfFloats);
+    const { count, weight } = this.#later;
+    if (!direct || weight > 0) this.#prepareTarget(columns, rows, !draft && this.halfFloats);
+    this.#picture(view, background, { first: 0, count: this.#count, columns, rows, draft, direct });
+    if (!direct) this.#show(size);
+    if (weight > 0) {
+      // The other picture goes over the one that is on the canvas.
+      this.#picture(view, background, { first: this.#count, count, columns, rows, draft, direct: false });
+      gl.enable(gl.BLEND);
+      gl.blendColor(0, 0, 0, weight);
+      gl.blendFunc(gl.CONSTANT_ALPHA, gl.ONE_MINUS_CONSTANT_ALPHA);
+      this.#show(size);
+      gl.disable(gl.BLEND);
+    }
+    gl.bindVertexArray(null);
+  }
+
+  /**
+   * Draws a part of the list onto the canvas or the target.
+   * @param {View} view @param {ArrayLike<number>} background
+   * @param {{ first: number, count: number, columns: number, rows: number, draft: boolean, direct: boolean }} part
+   */
+  #picture(view, background, { first, count, columns, rows, draft, direct }) {
+    const { gl, parts } = this;
+    const { translation } = view;
     gl.bindFramebuffer(gl.FRAMEBUFFER, direct ? null : parts.framebuffer);
     gl.viewport(0, 0, columns, rows);
     gl.clearColor(background[0], background[1], background[2], 1);
     gl.clear(gl.COLOR_BUFFER_BIT);
-    if (this.#count > 0) {
-      const [x, y] = [columns / width, rows / height];
-      gl.useProgram(parts.splats);
-      gl.uniformMatrix3fv(parts.rotation, true, Float32Array.from(rotation));
-      gl.uniform3f(parts.translation, translation[0], translation[1], translation[2]);
-      gl.uniform2f(parts.focal, view.fx * x, view.fy * y);
-      gl.uniform2f(parts.principal, view.cx * x, view.cy * y);
-      gl.uniform2f(parts.size, columns, rows);
-      gl.uniform1f(parts.tail, draft ? DRAFT_TAIL : 0);
-      gl.bindTexture(gl.TEXTURE_2D, parts.list);
-      gl.bindVertexArray(parts.quads);
-      gl.enable(gl.BLEND);
-      gl.blendFunc(gl.ONE, gl.ONE_MINUS_SRC_ALPHA);
-      // A triangle covers more than a quad, but is one in place of two: cheaper where there are few pixels.
-      gl.uniform1i(parts.triangles, Number(draft));
-      if (draft) gl.drawArrays(gl.TRIANGLES, 0, 3 * this.#count);
-      else gl.drawElements(gl.TRIANGLES, 6 * this.#count, gl.UNSIGNED_INT, 0);
-      gl.disable(gl.BLEND);
-    }
-    if (!direct) {
-      gl.bindFramebuffer(gl.FRAMEBUFFER, null);
-      gl.viewport(0, 0, width, height);
-      gl.useProgram(parts.screen);
-      gl.bindTexture(gl.TEXTURE_2D, parts.target);
-      gl.bindVertexArray(parts.nothing);
-      gl.drawArrays(gl.TRIANGLES, 0, 3);
-    }
-    gl.bindVertexArray(null);
+    if (count === 0) return;
+    const [x, y] = [columns / view.width, rows / view.height];
+    gl.useProgram(parts.splats);
+    gl.uniformMatrix3fv(parts.rotation, true, Float32Array.from(view.rotation));
+    gl.uniform3f(parts.translation, translation[0], translation[1], translation[2]);
+    gl.uniform2f(parts.focal, view.fx * x, view.fy * y);
+    gl.uniform2f(parts.principal, view.cx * x, view.cy * y);
+    gl.uniform2f(parts.size, columns, rows);
+    gl.uniform1f(parts.tail, draft ? DRAFT_TAIL : 0);
+    gl.bindTexture(gl.TEXTURE_2D, parts.list);
+    gl.bindVertexArray(parts.quads);
+    gl.enable(gl.BLEND);
+    gl.blendFunc(gl.ONE, gl.ONE_MINUS_SRC_ALPHA);
+    // A triangle covers more than a quad, but is one in place of two: cheaper where there are few pixels.
+    gl.uniform1i(parts.triangles, Number(draft));
+    if (draft) gl.drawArrays(gl.TRIANGLES, 3 * first, 3 * count);
+    else gl.drawElements(gl.TRIANGLES, 6 * count, gl.UNSIGNED_INT, 24 * first);
+    gl.disable(gl.BLEND);
+  }
+
+  /** Brings the target onto the canvas. @param {{ width: number, height: number }} size */
+  #show({ width, height }) {
+    const { gl, parts } = this;
+    gl.bindFramebuffer(gl.FRAMEBUFFER, null);
+    gl.viewport(0, 0, width, height);
+    gl.useProgram(parts.screen);
+    gl.bindTexture(gl.TEXTURE_2D, parts.target);
+    gl.bindVertexArray(parts.nothing);
+    gl.drawArrays(gl.TRIANGLES, 0, 3);
   }
 
   /** A mark behind all commands so far. */
@@ -249,5 +285,6 @@ export class SplatRenderer {
     for (const array of [parts.quads, parts.nothing]) gl.deleteVertexArray(array);
     for (const program of [parts.splats, parts.screen]) gl.deleteProgram(program);
     this.#count = 0;
+    this.#later = { count: 0, weight: 0 };
   }
 }

@@ -29,7 +29,8 @@ const SLICE = 8192;
  * @property {(level: number, time: number) => number} show
  * @property {() => number} count
  * @property {(time: number, first: number, last: number) => void} evaluate
- * @property {(row_x: number, row_y: number, row_z: number, row_w: number, eye_x: number, eye_y: number, eye_z: number, spread: number) => number} draw_list
+ * @property {(row_x: number, row_y: number, row_z: number, row_w: number, eye_x: number, eye_y: number, eye_z: number, spread: number, only: number) => number} draw_list
+ * @property {() => number} weight_of_later
  * @property {() => number} list_length
  * @property {(time: number) => number} attributes_at
  * @property {() => number} numbers_length
@@ -165,9 +166,10 @@ export class Decoder {
    * The list for drawing the last evaluation, see src/abi.
    * @param {import("./scene.js").Viewpoint} viewpoint
    * @param {ArrayBuffer | null} memory  to be used again
+   * @param {number} [only]  around a join of a take: 1 for the earlier segment, 2 for the later one
    */
-  drawList({ row, eye, spread = Infinity }, memory) {
-    const at = this.wasm.draw_list(row[0], row[1], row[2], row[3], eye[0], eye[1], eye[2], spread);
+  drawList({ row, eye, spread = Infinity }, memory, only = 0) {
+    const at = this.wasm.draw_list(row[0], row[1], row[2], row[3], eye[0], eye[1], eye[2], spread, only);
     const list = new Float32Array(this.wasm.memory.buffer, at, this.wasm.list_length());
     if (!memory || memory.byteLength < list.byteLength) return list.slice();
     const copy = new Float32Array(memory, 0, list.length);

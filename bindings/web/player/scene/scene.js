@@ -47,6 +47,8 @@
  * @typedef {object} Frame  what the renderer draws
  * @property {Float32Array} list  back to front, 16 numbers a Gaussian: center (3), opacity, covariance xx, xy, xz, yy, yz, zz,
  *   color as seen from the viewpoint (3), three zeros; filled up to a multiple of 256 Gaussians with zeros
+ * @property {{ list: Float32Array, weight: number } | null} later  only where `apart` was asked for, around a join of a take: the list with
+ *   the later segment, where the first one has the earlier. The picture is `(1 - weight) · first + weight · later`
  * @property {number} evaluateMs  what the motion took; 0 where the list before was for the same time
  * @property {number} sortMs  what order and colors took
  */
@@ -102,10 +104,12 @@ export class Scene extends EventTarget {
    * @param {Viewpoint} viewpoint
    * @param {ArrayBuffer | null} [memory]  to be used again
    * @param {number} [level]  of detail: 0 is the scene itself, at most {@link SceneInfo.levels}
+   * @param {boolean} [apart]  whether two segments around a join of a take are listed apart, for two pictures and their mean. One list has
+   *   both otherwise, less opaque
    * @returns {Promise<Frame>}
    */
-  async frame(time, viewpoint, memory = null, level = 0) {
-    return this.connection.ask({ type: "frame", time, viewpoint, memory, level }, memory ? [memory] : []);
+  async frame(time, viewpoint, memory = null, level = 0, apart = false) {
+    return this.connection.ask({ type: "frame", time, viewpoint, memory, level, apart }, memory ? [memory] : []);
   }
 
   /**

@@ -39,15 +39,18 @@ const inTurn = (/** @type {() => void | Promise<void>} */ work) => {
 };
 
 /** @param {any} request */
-async function frame({ id, time, viewpoint, memory, level }) {
+async function frame({ id, time, viewpoint, memory, level, apart }) {
   if (!decoder) throw new Error("no scene is open");
   (take ?? decoder).show(level, time);
   const start = performance.now();
   const moved = time !== decoder.time;
   if (moved) await decoder.evaluate(time, pause);
   const evaluated = performance.now();
-  const list = decoder.drawList(viewpoint, memory);
-  send({ id, list, evaluateMs: moved ? evaluated - start : 0, sortMs: performance.now() - evaluated }, [list.buffer]);
+  const weight = apart ? decoder.wasm.weight_of_later() : 0;
+  const list = decoder.drawList(viewpoint, memory, Number(weight > 0));
+  const later = weight > 0 ? { list: decoder.drawList(viewpoint, null, 2), weight } : null;
+  const times = { evaluateMs: moved ? evaluated - start : 0, sortMs: performance.now() - evaluated };
+  send({ id, list, later, ...times }, [list.buffer, ...(later ? [later.list.buffer] : [])]);
 }
 
 /** @type {Record<string, (request: any) => void | Promise<void>>} */

@@ -163,9 +163,10 @@ export class Take extends Scene {
    * Without its segment, where that cannot be had.
    * @param {number} seconds
    * @param {import("../scene/scene.js").Viewpoint} viewpoint @param {ArrayBuffer | null} [memory] @param {number} [level]
+   * @param {boolean} [apart]
    */
-  frame(seconds, viewpoint, memory = null, level = 0) {
-    return this.segments.with(seconds, async () => super.frame(seconds, viewpoint, memory, level));
+  frame(seconds, viewpoint, memory = null, level = 0, apart = false) {
+    return this.segments.with(seconds, async () => super.frame(seconds, viewpoint, memory, level, apart));
   }
 
   /** @param {number} share */

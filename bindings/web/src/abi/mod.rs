@@ -169,7 +169,8 @@ pub extern "C" fn evaluate(time: f64, first: usize, last: usize) {
 /// The Gaussians to draw, back to front, 16 numbers each: center, opacity, covariance xx, xy, xz, yy, yz, zz, color,
 /// and three zeros. Filled up to a multiple of 256 Gaussians with zeros. The depth of a point is `x · row_x + y · row_y
 /// + z · row_z + row_w`; the camera stands at the eye and sees the cone with this tangent, or all in front of it.
-/// [`list_length`] is their number.
+/// `only` chooses a segment of a take around a join, where [`weight_of_later`] is not 0: the base is listed with the earlier one
+/// for 1 and with the later one for 2; with both for 0. [`list_length`] is the number of numbers.
 #[cfg_attr(target_os = "unknown", unsafe(no_mangle))]
 pub extern "C" fn draw_list(
     row_x: f32,
@@ -180,16 +181,27 @@ pub extern "C" fn draw_list(
     eye_y: f32,
     eye_z: f32,
     spread: f32,
+    only: usize,
 ) -> *const f32 {
     let viewpoint = Viewpoint { row: [row_x, row_y, row_z, row_w], eye: [eye_x, eye_y, eye_z], spread };
     let state = &mut *state();
     let list = match (&mut state.take, &mut state.scene) {
-        (Some(take), _) => take.draw_list(&viewpoint),
+        (Some(take), _) => match only.checked_sub(1) {
+            None => take.draw_list(&viewpoint),
+            Some(place) => take.draw_list_with(place, &viewpoint),
+        },
         (None, Some(scene)) => scene.draw_list(&viewpoint),
         (None, None) => &[],
     };
     state.list_length = list.len();
     list.as_ptr()
+}
+
+/// Around a join of a take, the weight of the later of two segments: the picture is the mean of the pictures with either, by
+/// their weights. 0 elsewhere.
+#[cfg_attr(target_os = "unknown", unsafe(no_mangle))]
+pub extern "C" fn weight_of_later() -> f32 {
+    state().take.as_ref().map_or(0.0, OpenTake::weight_of_later)
 }
 
 /// The number of numbers that [`draw_list`] returned.

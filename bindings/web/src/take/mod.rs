@@ -162,7 +162,23 @@ impl OpenTake {
         }
     }
 
-    /// Base and segments as computed last, back to front, [`ENTRY`](crate::ENTRY) numbers each.
+    /// The weight of the later segment where two are drawn, around a join; 0 elsewhere.
+    pub fn weight_of_later(&self) -> f32 {
+        if let [_, (_, weight)] = self.shown[..] { weight } else { 0.0 }
+    }
+
+    /// The base and one segment of those that are drawn, by its place among them, as computed last and as [`OpenTake::draw_list`]
+    /// has them: around a join, the picture is the mean of the pictures of the two by their weights.
+    pub fn draw_list_with(&mut self, place: usize, viewpoint: &Viewpoint) -> &[f32] {
+        let Some(segment) = self.shown.get(place).map(|(number, _)| &self.segments[*number]) else { return &[] };
+        let shares = [(&segment.hidden[..], 1.0)];
+        let base = self.base.iter().map(|base| base.drawn(&shares));
+        let parts: Vec<_> = base.chain([segment.part.drawn(WHOLE)]).collect();
+        self.list.make(&parts, viewpoint)
+    }
+
+    /// Base and segments as computed last, back to front, [`ENTRY`](crate::ENTRY) numbers each. Two segments have the opacities of
+    /// [`drawn_together`].
     pub fn draw_list(&mut self, viewpoint: &Viewpoint) -> &[f32] {
         let shares: Vec<Share<'_>> =
             self.shown.iter().map(|&(number, weight)| (&self.segments[number].hidden[..], weight)).collect();

@@ -137,8 +137,9 @@ impl PlayableTake {
     }
 
     /// The Gaussians at a time of the take in seconds, before their activations: those of the base that are not hidden, then
-    /// those of the segment, or of two around a join, as [`drawn_together`] puts them; those of the base alone where no segment is
-    /// shown. To the bit the same on every machine. Takes one thread, and more to decode a segment.
+    /// those of the segment, or of two around a join, as [`drawn_together`] puts them ([`PlayableTake::render`] draws the two
+    /// apart); those of the base alone where no segment is shown. To the bit the same on every machine. Takes one thread, and
+    /// more to decode a segment.
     ///
     /// # Errors
     /// A time that is NaN or infinite; a segment that is damaged; what the system refuses.
@@ -147,22 +148,44 @@ impl PlayableTake {
     }
 
     /// An image `[height, width, 3]` of the take at a time in seconds: red, green, blue over the background, 0 or more and not
-    /// clamped above. Takes the threads of rayon's current pool; the numbers do not depend on how many there are.
+    /// clamped above. Around a join it is the mean of the images with each of the two segments alone, by their weights: errors of
+    /// the two average out, where two models in one scene cover each other. Takes the threads of rayon's current pool; the
+    /// numbers do not depend on how many there are.
     ///
     /// # Errors
     /// As [`PlayableTake::at`]; for the size of the image and its memory as [`PlayableScene::render`].
     pub fn render(&self, camera: &Camera, seconds: f64, background: [f32; 3]) -> Result<Vec<f32>, CodecError> {
         let drawn = self.drawn_at(seconds)?;
+        if let [] | [_] = drawn[..] {
+            return self.image(camera, seconds, background, &drawn);
+        }
+        let mut mean = Vec::new();
+        for (shown, weight) in drawn {
+            let image = self.image(camera, seconds, background, &[(shown, 1.0)])?;
+            mean.resize(image.len(), 0.0);
+            mean.iter_mut().zip(&image).for_each(|(sum, value)| *sum += weight * value);
+        }
+        Ok(mean)
+    }
+
+    /// The image with the base and these segments in one scene.
+    fn image(
+        &self,
+        camera: &Camera,
+        seconds: f64,
+        background: [f32; 3],
+        drawn: &[(Arc<Shown>, f32)],
+    ) -> Result<Vec<f32>, CodecError> {
         let (mut allowance, mut count) = (self.base.allowance(), self.base.len());
         // Harmonics are padded to the largest degree: at most as many as the widest would have for all.
         let width = |scene: &PlayableScene| scene.numbers().div_ceil(scene.len().max(1));
         let mut widest = width(&self.base);
-        for (shown, _) in &drawn {
+        for (shown, _) in drawn {
             allowance = allowance.max(shown.scene.allowance());
             count += shown.scene.len();
             widest = widest.max(width(&shown.scene));
         }
-        allowance.image(camera, background, (count, count * widest), || self.gaussians(seconds, &drawn))
+        allowance.image(camera, background, (count, count * widest), || self.gaussians(seconds, drawn))
     }
 
     fn gaussians(&self, seconds: f64, drawn: &[(Arc<Shown>, f32)]) -> Result<GaussianArrays, CodecError> {

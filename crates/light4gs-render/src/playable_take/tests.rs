@@ -64,13 +64,12 @@ fn playable() -> PlayableTake {
 #[test]
 fn segments_move_by_their_own_times_and_fade_at_the_joins() {
     let take = playable();
-    // (seconds, Gaussians of the base, heights of the segments'): margins are a quarter of each stream,
-    // and the fade takes a quarter of both.
-    let expected: [(f64, usize, &[f32]); 12] = [
+    // (seconds, Gaussians of the base, heights of the segments'): margins are a quarter of each stream, and the fade takes the
+    // margins of both.
+    let expected: [(f64, usize, &[f32]); 11] = [
         (0.0, 3, &[0.25]),
         (1.0, 3, &[0.5]),
-        (1.5, 3, &[0.625]),
-        (1.875, 3, &[0.71875, 0.21875]),
+        (1.5, 3, &[0.625, 0.125]),
         (2.0, 3, &[0.75, 0.25]),
         (3.0, 1, &[0.5]),
         (3.5, 1, &[0.625]),
@@ -90,7 +89,7 @@ fn segments_move_by_their_own_times_and_fade_at_the_joins() {
     let hidden = take.at(3.5).expect("Gaussians");
     assert_eq!(hidden.means[0], [0.0, 0.0, 0.0], "the middle one is not hidden");
     // All opacities are equal; a quarter of the way, the later segment has a quarter, and what it hides three quarters.
-    let logits = take.at(1.875).expect("Gaussians").opacity_logits;
+    let logits = take.at(1.5).expect("Gaussians").opacity_logits;
     assert_eq!((logits[1], logits[0], logits[2]), (4.0, logits[3], logits[3]));
     assert!(logits[4] < logits[3] && logits[3] < 4.0, "{logits:?}");
 }
@@ -105,17 +104,30 @@ fn harmonics_are_padded_to_the_larger_degree() {
 }
 
 #[test]
-fn images_are_those_of_the_gaussians_together() {
+fn images_are_those_of_the_gaussians_and_at_a_join_the_mean_of_two() {
     let take = playable();
     let (eye, up) = ([0.0, -6.0, 0.0], [0.0, 0.0, 1.0]);
     let camera = Camera::look_at(eye.into(), [0.0; 3].into(), up.into(), 0.9, 65, 65);
-    for seconds in [1.0, 2.0625, 3.0, 5.0] {
-        let image = take.render(&camera, seconds, [0.1, 0.2, 0.3]).expect("an image");
-        // The same Gaussians as one scene.
-        let together = SceneData { gaussians: take.at(seconds).expect("Gaussians"), ..SceneData::default() };
-        let scene = PlayableScene::decode(&encode(&together).expect("a stream"), &Limits::default());
-        assert_eq!(image, scene.expect("a scene").render(&camera, 0.0, [0.1, 0.2, 0.3]).expect("an image"));
+    let background = [0.1, 0.2, 0.3];
+    // The same Gaussians as one scene.
+    let as_scene = |gaussians: GaussianArrays| {
+        let stream = encode(&SceneData { gaussians, ..SceneData::default() }).expect("a stream");
+        let scene = PlayableScene::decode(&stream, &Limits::default()).expect("a scene");
+        scene.render(&camera, 0.0, background).expect("an image")
+    };
+    for seconds in [0.9, 3.1, 5.0] {
+        let image = take.render(&camera, seconds, background).expect("an image");
+        assert_eq!(image, as_scene(take.at(seconds).expect("Gaussians")));
     }
+    // Three quarters of the way through the fade from 1 to 3 seconds: each segment alone with its part of the base.
+    let alone = [0, 1].map(|number| {
+        let shown = take.decoded_segment(number).expect("a segment");
+        as_scene(take.gaussians(2.5, &[(shown, 1.0)]).expect("Gaussians"))
+    });
+    let image = take.render(&camera, 2.5, background).expect("an image");
+    let mean = alone[0].iter().zip(&alone[1]).map(|(earlier, later)| 0.25 * earlier + 0.75 * later);
+    assert!(image.iter().zip(mean).all(|(found, expected)| (found - expected).abs() < 1e-6));
+    assert_ne!(alone[0], alone[1]);
     // Where a Gaussian is hidden, the background is.
     let left = |seconds: f64| {
         let image = take.render(&camera, seconds, [0.0; 3]).expect("an image");

@@ -104,18 +104,17 @@ fn a_segment_fades_into_the_next_one() {
         [times(0.0, 0.0, 2.5), times(2.0, 1.5, 4.0), times(4.0, 3.0, 9.0), times(6.0, 2.0, 9.0), times(9.0, 8.0, 11.0)];
     let take = read(&write_take(&meta(), &stream(1, 0), &segments, 0).expect("a take")).expect("a take");
     let drawn = |seconds: f64| take.drawn_at(seconds).iter().map(|one| (one.segment, one.weight)).collect::<Vec<_>>();
-    for (seconds, segment) in
-        [(0.0, 0), (1.875, 0), (2.125, 1), (3.75, 1), (4.0, 2), (5.75, 2), (6.25, 3), (7.9, 3), (9.0, 4)]
+    for (seconds, segment) in [(0.0, 0), (1.5, 0), (2.5, 1), (3.0, 1), (4.0, 2), (5.0, 2), (7.0, 3), (7.9, 3), (9.0, 4)]
     {
         assert_eq!(drawn(seconds), [(segment, 1.0)], "{seconds}");
     }
     for (seconds, expected) in [
-        (1.9375, [(0, 0.75), (1, 0.25)]),
+        (1.75, [(0, 0.75), (1, 0.25)]),
         (2.0, [(0, 0.5), (1, 0.5)]),
-        (2.0625, [(0, 0.25), (1, 0.75)]),
-        (3.875, [(1, 0.5), (2, 0.5)]),
-        (5.875, [(2, 0.75), (3, 0.25)]),
-        (6.125, [(2, 0.25), (3, 0.75)]),
+        (2.25, [(0, 0.25), (1, 0.75)]),
+        (3.5, [(1, 0.5), (2, 0.5)]),
+        (5.5, [(2, 0.75), (3, 0.25)]),
+        (6.5, [(2, 0.25), (3, 0.75)]),
     ] {
         assert_eq!(drawn(seconds), expected, "{seconds}");
     }

@@ -67,10 +67,17 @@ export declare class SplatRenderer {
     restore(): void;
     /** Has the graphics driver compile what an image in full takes, while there is none. */
     warm(): void;
-    /** @param {Float32Array} list  what is drawn, as {@link import("../scene/scene.js").Scene.frame} gives it */
-    setList(list: Float32Array): void;
     /**
-     * Draws the list that was set, over a background.
+     * What is drawn, as {@link import("../scene/scene.js").Scene.frame} gives it.
+     * @param {Float32Array} list
+     * @param {{ list: Float32Array, weight: number } | null} [later]  of another picture, with which that of the list is mixed
+     */
+    setList(list: Float32Array, later?: {
+        list: Float32Array;
+        weight: number;
+    } | null): void;
+    /**
+     * Draws the list that was set, over a background; of two lists the mean, by the weight of the later one.
      * @param {View} view
      * @param {ArrayLike<number>} background  red, green, blue in [0, 1]
      * @param {number} [scale]  below 1: a draft with this share of the pixels along each side, in bytes, and enlarged

@@ -125,6 +125,14 @@ export type Frame = {
      */
     list: Float32Array;
     /**
+     * only where `apart` was asked for, around a join of a take: the list with
+     * the later segment, where the first one has the earlier. The picture is `(1 - weight) · first + weight · later`
+     */
+    later: {
+        list: Float32Array;
+        weight: number;
+    } | null;
+    /**
      * what the motion took; 0 where the list before was for the same time
      */
     evaluateMs: number;
@@ -176,6 +184,8 @@ export type Frame = {
  * @typedef {object} Frame  what the renderer draws
  * @property {Float32Array} list  back to front, 16 numbers a Gaussian: center (3), opacity, covariance xx, xy, xz, yy, yz, zz,
  *   color as seen from the viewpoint (3), three zeros; filled up to a multiple of 256 Gaussians with zeros
+ * @property {{ list: Float32Array, weight: number } | null} later  only where `apart` was asked for, around a join of a take: the list with
+ *   the later segment, where the first one has the earlier. The picture is `(1 - weight) · first + weight · later`
  * @property {number} evaluateMs  what the motion took; 0 where the list before was for the same time
  * @property {number} sortMs  what order and colors took
  */
@@ -208,9 +218,11 @@ export declare class Scene extends EventTarget {
      * @param {Viewpoint} viewpoint
      * @param {ArrayBuffer | null} [memory]  to be used again
      * @param {number} [level]  of detail: 0 is the scene itself, at most {@link SceneInfo.levels}
+     * @param {boolean} [apart]  whether two segments around a join of a take are listed apart, for two pictures and their mean. One list has
+     *   both otherwise, less opaque
      * @returns {Promise<Frame>}
      */
-    frame(time: number, viewpoint: Viewpoint, memory?: ArrayBuffer | null, level?: number): Promise<Frame>;
+    frame(time: number, viewpoint: Viewpoint, memory?: ArrayBuffer | null, level?: number, apart?: boolean): Promise<Frame>;
     /**
      * One number for all bits of the scene that a file decodes to, as 16 hexadecimal digits: the same on every machine.
      * @param {ArrayBuffer} bytes

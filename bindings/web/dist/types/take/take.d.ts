@@ -93,8 +93,9 @@ export declare class Take extends Scene {
      * Without its segment, where that cannot be had.
      * @param {number} seconds
      * @param {import("../scene/scene.js").Viewpoint} viewpoint @param {ArrayBuffer | null} [memory] @param {number} [level]
+     * @param {boolean} [apart]
      */
-    frame(seconds: number, viewpoint: import("../scene/scene.js").Viewpoint, memory?: ArrayBuffer | null, level?: number): Promise<import("../scene/scene.js").Frame>;
+    frame(seconds: number, viewpoint: import("../scene/scene.js").Viewpoint, memory?: ArrayBuffer | null, level?: number, apart?: boolean): Promise<import("../scene/scene.js").Frame>;
     /** While a segment is on its way, what was shown before stays. @param {number} share */
     momentAt(share: number): number;
     /** @param {number} share @param {boolean} loop */
