@@ -70,6 +70,10 @@ export class Player extends EventTarget {
   #shownFrom = "";
   /** The level of detail of the list that the renderer has. */
   #shownLevel = 0;
+  /** Whether the list shows two segments of a take at once, as a draft of the mean of two pictures. */
+  #shownTogether = false;
+  /** Whether it is that mean. */
+  #shownMixed = false;
   /** @type {Draft} */
   #draft;
   #wasDraft = false;
@@ -296,14 +300,14 @@ export class Player extends EventTarget {
    */
   #render(now) {
     if (this.#disposed || this.#isDrawing(now)) return;
-    const full = this.#isStill(now) && this.#shownLevel === 0 && this.#isShown();
+    const full = this.#isStill(now) && this.#shownLevel === 0 && !this.#shownTogether && this.#isShown();
     if (!this.#dirty && !(this.#wasDraft && full)) return;
     this.#measure();
     this.#draw(full ? 1 : this.#draft.scale);
     // The worker makes the next list while this one is drawn.
     if (this.#playing) this.#update();
-    // Right after a rest the list has more Gaussians than those that follow.
-    this.#drawing = { fence: this.renderer.fence(), since: now, moving: !full && this.#shownLevel === this.#draft.level };
+    // Right after a rest the list has more Gaussians than those that follow, and few images are the mean of two.
+    this.#drawing = { fence: this.renderer.fence(), since: now, moving: !full && !this.#shownMixed && this.#shownLevel === this.#draft.level };
     this.#watch();
   }
 
@@ -342,8 +346,10 @@ export class Player extends EventTarget {
   #update() {
     if (this.#busy || this.#undrawn) return;
     const still = this.#isStill(performance.now());
-    if (this.#isShown() && !(still && this.#shownLevel > 0)) return;
-    this.#show(still ? 0 : this.#draft.level).catch(this.#fail);
+    if (this.#isShown() && !(still && (this.#shownLevel > 0 || this.#shownTogether))) return;
+    const { level, scale } = this.#draft;
+    // Where there is no time for all pixels, there is none for two pictures.
+    (still ? this.#show() : this.#show(level, level === 0 && scale === 1)).catch(this.#fail);
   }
 
   /** Whether the graphics card is still at the last image. @param {number} now */
@@ -408,8 +414,9 @@ export class Player extends EventTarget {
   /**
    * Has the worker make the list for the current time and viewpoint, and gives it to the renderer.
    * @param {number} [level]  of detail
+   * @param {boolean} [apart]  whether the picture around a join of a take is the mean of two
    */
-  async #show(level = 0) {
+  async #show(level = 0, apart = true) {
     this.#busy = true;
     try {
       const time = this.#moment;
@@ -418,7 +425,7 @@ export class Player extends EventTarget {
       // A draft may leave out Gaussians outside of the image: the image at rest has a list of its own.
       const viewpoint = level > 0 ? { ...this.#viewpoint(), spread: this.#spread() } : this.#viewpoint();
       this.#spare = null;
-      const { list, later, evaluateMs, sortMs } = await this.scene.frame(time, viewpoint, memory, level, true);
+      const { list, later, together, evaluateMs, sortMs } = await this.scene.frame(time, viewpoint, memory, level, apart);
       if (this.#disposed) return;
       const start = performance.now();
       this.renderer.setList(list, later);
@@ -426,10 +433,12 @@ export class Player extends EventTarget {
       this.timings.upload = performance.now() - start;
       this.timings.sort = sortMs;
       if (evaluateMs > 0) this.timings.evaluate = evaluateMs;
-      if (level === this.#draft.level && !this.#isStill(start)) this.#draft.measureWorker(evaluateMs + sortMs, start);
+      if (level === this.#draft.level && !later && !this.#isStill(start)) this.#draft.measureWorker(evaluateMs + sortMs, start);
       this.#shownTime = time;
       this.#shownFrom = key;
       this.#shownLevel = level;
+      this.#shownTogether = together;
+      this.#shownMixed = Boolean(later);
       this.#dirty = this.#undrawn = true;
     } finally {
       this.#busy = false;

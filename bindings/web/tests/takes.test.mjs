@@ -152,7 +152,7 @@ test("joins are played without a pause and without an image that lacks Gaussians
 test("in a fade, the picture is the mean of those with either segment", async () => {
   serveTake(take, { step: Infinity });
   const page = await takePage();
-  const { weight, differences, apart } = await page.evaluate(async (view) => {
+  const { weight, differences, apart, kinds } = await page.evaluate(async (view) => {
     const player = await globalThis.play(await globalThis.load(), { controls: false });
     const { renderer } = player;
     let both;
@@ -172,10 +172,18 @@ test("in a fade, the picture is the mean of those with either segment", async ()
       return renderer.readPixels();
     });
     const mean = drawn.map((_, k) => Math.round((1 - later.weight) * pictures[0][k] + later.weight * pictures[1][k]));
+    // One list for both is a draft; elsewhere there is one segment.
+    const from = { row: [0, 0, 1, 4], eye: [0, 0, -4] };
+    const kinds = [];
+    for (const [seconds, apart] of [[1.98, true], [1.98, false], [1.5, true]]) {
+      const { later, together } = await player.scene.frame(seconds, from, null, 0, apart);
+      kinds.push([later !== null, together]);
+    }
     const differ = (/** @type {Uint8Array} */ one) => one.reduce((most, value, k) => Math.max(most, Math.abs(value - drawn[k])), 0);
-    return { weight: later.weight, differences: differ(mean), apart: pictures.map(differ) };
+    return { weight: later.weight, differences: differ(mean), apart: pictures.map(differ), kinds };
   }, view);
   assert.ok(weight > 0.1 && weight < 0.9, `${weight}`);
+  assert.deepEqual(kinds, [[true, false], [false, true], [false, false]]);
   assert.ok(apart.every((difference) => difference > 20), apart.join());
   // The canvas rounds twice.
   assert.ok(differences <= 2, `${differences}`);

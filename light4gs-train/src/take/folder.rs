@@ -24,6 +24,8 @@ const BASE_FROM_SEGMENT: &str = "../../base/scene.l4gs";
 /// Images of the base, about: enough to see every place several times, few enough to be read quickly.
 const BASE_IMAGES: usize = 300;
 const FEWEST_BASE_TIMES: usize = 24;
+/// The cap on Gaussians of a segment, as a share of that of a clip: the base has what stands still.
+const SEGMENT_SHARE: f64 = 0.5;
 /// MiB of decoded images that any training keeps.
 const LEAST_IN_MEMORY: u64 = 16;
 /// At most, bytes of a take's front without the rows of its segments, and of a row with the hidden list of a segment.
@@ -204,6 +206,8 @@ impl TakeFolder {
         let mut config = self.config.clone();
         config.model.base = Some(BASE_FROM_SEGMENT.into());
         config.data.between = self.record.plan.between(segment);
+        let most = &mut config.train.densify.strategies.adaptive.max_gaussians;
+        *most = (*most as f64 * SEGMENT_SHARE).ceil() as usize;
         let target = config.compression.target_bytes;
         if target > 0 {
             let file = self.base().join("scene.l4gs");

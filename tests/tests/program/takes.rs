@@ -8,6 +8,7 @@ use crate::PROGRAM;
 use light4gs_codec::Limits;
 use light4gs_codec::take::Take;
 use light4gs_tests::program::{TINY, TINY_COMPRESSION, Workspace, assert_refused, assert_success};
+use light4gs_train::config::Config;
 use serde_json::Value;
 
 /// Three seconds of a rig, ten frames per second.
@@ -53,6 +54,12 @@ fn a_take_is_trained_in_parts_and_plays_as_one_file() {
         light4gs_codec::decode(&take.segment(number).unwrap().stream).unwrap();
     }
     assert!(light4gs_codec::decode(&take.base().unwrap()).unwrap().motion.kind.is_empty());
+    // A segment has half of the Gaussians: the base has the others.
+    let most_gaussians = |run: &str| {
+        let config = Config::from_file(w.path(run).join("config.toml")).unwrap();
+        config.train.densify.strategies.adaptive.max_gaussians
+    };
+    assert_eq!(2 * most_gaussians("take/segments/0001"), most_gaussians("take"));
 
     // The same command has nothing left to do; joining gives the same file.
     assert_success(&train(&w, "take", &[]).output().unwrap());

@@ -46,11 +46,12 @@ async function frame({ id, time, viewpoint, memory, level, apart }) {
   const moved = time !== decoder.time;
   if (moved) await decoder.evaluate(time, pause);
   const evaluated = performance.now();
-  const weight = apart ? decoder.wasm.weight_of_later() : 0;
-  const list = decoder.drawList(viewpoint, memory, Number(weight > 0));
-  const later = weight > 0 ? { list: decoder.drawList(viewpoint, null, 2), weight } : null;
+  const weight = decoder.wasm.weight_of_later();
+  const [joins, mixed] = [weight > 0, weight > 0 && apart];
+  const list = decoder.drawList(viewpoint, memory, Number(mixed));
+  const later = mixed ? { list: decoder.drawList(viewpoint, null, 2), weight } : null;
   const times = { evaluateMs: moved ? evaluated - start : 0, sortMs: performance.now() - evaluated };
-  send({ id, list, later, ...times }, [list.buffer, ...(later ? [later.list.buffer] : [])]);
+  send({ id, list, later, together: joins && !mixed, ...times }, [list.buffer, ...(later ? [later.list.buffer] : [])]);
 }
 
 /** @type {Record<string, (request: any) => void | Promise<void>>} */

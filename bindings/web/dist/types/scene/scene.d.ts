@@ -133,6 +133,10 @@ export type Frame = {
         weight: number;
     } | null;
     /**
+     * whether the list has two segments of a take at once, less opaque
+     */
+    together: boolean;
+    /**
      * what the motion took; 0 where the list before was for the same time
      */
     evaluateMs: number;
@@ -186,6 +190,7 @@ export type Frame = {
  *   color as seen from the viewpoint (3), three zeros; filled up to a multiple of 256 Gaussians with zeros
  * @property {{ list: Float32Array, weight: number } | null} later  only where `apart` was asked for, around a join of a take: the list with
  *   the later segment, where the first one has the earlier. The picture is `(1 - weight) · first + weight · later`
+ * @property {boolean} together  whether the list has two segments of a take at once, less opaque
  * @property {number} evaluateMs  what the motion took; 0 where the list before was for the same time
  * @property {number} sortMs  what order and colors took
  */
