@@ -7,14 +7,20 @@
 use super::{Config, Overrides};
 use crate::density::gaussians_for_images;
 
-/// Bytes of a file per Gaussian of `max_gaussians` at the reference point of the measured hull (docs/results.md, sizes). The
-/// formulas below give weight and pruning at `r` times these bytes: for a smaller file both are larger.
-const BYTES_A_GAUSSIAN: f64 = 6.4;
+/// Bytes of a file that its motion takes, and those of each Gaussian of it (docs/notebook/2026-11-29-d-nerf.md).
+const BYTES_OF_MOTION: f64 = 8e3;
+const BYTES_A_GAUSSIAN: f64 = 8.3;
+/// The cap on Gaussians is at most this number of times the preset's: a training takes longer with more of them.
+const MOST_GROWTH: f64 = 2.0;
+/// Bytes at which the formulas below have their first number; `r` is a file's size in these bytes (docs/results.md, sizes).
+const REFERENCE_BYTES: f64 = 64e3;
 /// Weight of a megabyte of attributes in the loss: the first number times `r` to the power of the second.
 const MEGABYTE: (f64, f64) = (0.03, -2.0);
 /// Share of the Gaussians that a pass of pruning drops: the first number plus the second times `ln r`, within the bounds.
 const PRUNED: (f64, f64) = (0.3, -0.17);
 const PRUNED_BOUNDS: [f64; 2] = [0.1, 0.6];
+/// Fewer Gaussians than this show no scene, however small its file.
+const FEWEST: f64 = 1000.0;
 
 impl Config {
     /// For images whose longer side has `pixels` pixels: changes the resolution and the numbers of Gaussians. `longest` is
@@ -34,25 +40,31 @@ impl Config {
         config
     }
 
-    /// For a file of at most `bytes`: sets the target, the share of pruned Gaussians, and the initial weight of a byte,
-    /// which the trainer corrects as it goes. Keys that are set `by_hand` stay as they are.
+    /// For a file of at most `bytes`: sets the target, the cap on Gaussians, the share of them that is pruned, and the initial weight
+    /// of a byte, which the trainer corrects as it goes. Keys that are set `by_hand` stay as they are.
     pub fn for_target_bytes(&self, bytes: usize, by_hand: &Overrides) -> Self {
         let mut config = self.with_a_rate(by_hand);
         let Self { train, compression, .. } = &mut config;
         by_hand.unless_set("compression.target_bytes", &mut compression.target_bytes, bytes);
         if compression.rate.attributes {
-            let most = train.densify.strategies.adaptive.max_gaussians.max(1);
-            let ratio = bytes as f64 / most as f64 / BYTES_A_GAUSSIAN;
-            let [least, largest] = PRUNED_BOUNDS;
-            let pruned = (PRUNED.0 + PRUNED.1 * ratio.ln()).clamp(least, largest);
+            let bytes = bytes as f64;
+            let ratio = bytes / REFERENCE_BYTES;
             let weight = (MEGABYTE.0 * ratio.powf(MEGABYTE.1)).clamp(1e-4, 1.0);
             let lambda = &mut compression.rate.attribute_lambda;
             by_hand.unless_set("compression.rate.attribute_lambda", lambda, rounded(weight, 1e5));
+            let [least, largest] = PRUNED_BOUNDS;
+            let pruned = (PRUNED.0 + PRUNED.1 * ratio.ln()).clamp(least, largest);
             // In a short schedule of the user's, the iterations of pruning may lie behind its end. They are legal there only
             // as long as pruning is off.
             if train.prune.iterations.iter().all(|pass| *pass <= train.fine_iterations) {
                 by_hand.unless_set("train.prune.fraction", &mut train.prune.fraction, rounded(pruned, 1e3));
             }
+            let kept = (1.0 - train.prune.fraction.min(largest)).powi(train.prune.iterations.len() as i32);
+            let most = &mut train.densify.strategies.adaptive.max_gaussians;
+            let before = *most as f64;
+            let cap =
+                ((bytes - BYTES_OF_MOTION) / BYTES_A_GAUSSIAN / kept).clamp(FEWEST.min(before), MOST_GROWTH * before);
+            by_hand.unless_set("train.densify.adaptive.max_gaussians", most, cap.round() as usize);
         }
         config
     }
@@ -175,7 +187,7 @@ mod tests {
         assert_eq!(most(960, 400), (Some(960), most(400, 400).1));
     }
 
-    /// At the hull's bytes, its values; with fewer bytes fewer Gaussians and a dearer byte, within bounds.
+    /// At the reference, its values; with fewer bytes fewer Gaussians and a dearer byte, within bounds.
     #[test]
     fn fewer_bytes_are_fewer_gaussians_and_a_dearer_byte() {
         let config = Config::load("dnerf", &[]).unwrap();
@@ -184,13 +196,16 @@ mod tests {
             config.validate().unwrap();
             assert_eq!(config.compression.target_bytes, bytes);
             assert!(config.compression.rate.lambda > 0.0);
-            (config.train.prune.fraction, config.compression.rate.attribute_lambda)
+            let most = config.train.densify.strategies.adaptive.max_gaussians;
+            (config.train.prune.fraction, config.compression.rate.attribute_lambda, most)
         };
-        assert_eq!(at(64_000), (0.3, 0.03));
-        let (fraction, lambda) = at(40_000);
-        assert!(fraction > 0.3 && lambda > 0.06, "{fraction}, {lambda}");
-        assert_eq!(at(1000), (0.6, 1.0));
-        assert_eq!(at(1_000_000_000), (0.1, 1e-4));
+        let most = config.train.densify.strategies.adaptive.max_gaussians;
+        // Two passes of pruning leave 5600 Gaussians.
+        assert_eq!(at(64_000), (0.3, 0.03, 13_769));
+        let (fraction, lambda, fewer) = at(40_000);
+        assert!(fraction > 0.3 && lambda > 0.06 && fewer < 13_769, "{fraction}, {lambda}, {fewer}");
+        assert_eq!(at(1000), (0.6, 1.0, 1000));
+        assert_eq!(at(1_000_000_000), (0.1, 1e-4, 2 * most));
     }
 
     #[test]
