@@ -25,7 +25,7 @@ const BASE_FROM_SEGMENT: &str = "../../base/scene.l4gs";
 const BASE_IMAGES: usize = 300;
 const FEWEST_BASE_TIMES: usize = 24;
 /// The cap on Gaussians of a segment, as a share of that of a clip: the base has what stands still.
-const SEGMENT_SHARE: f64 = 0.5;
+pub const SEGMENT_SHARE: f64 = 0.5;
 /// MiB of decoded images that any training keeps.
 const LEAST_IN_MEMORY: u64 = 16;
 /// At most, bytes of a take's front without the rows of its segments, and of a row with the hidden list of a segment.

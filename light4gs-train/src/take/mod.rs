@@ -29,6 +29,6 @@ mod start;
 pub use base::{Base, HIDDEN, backdrop_of};
 pub use cuts::cuts;
 pub use evaluation::{JoinScores, TakeEvaluation, TakeFrame, evaluate_take, render_take};
-pub use folder::{TakeFolder, TakeRecord};
+pub use folder::{SEGMENT_SHARE, TakeFolder, TakeRecord};
 pub use plan::{PlannedSegment, SegmentLength, TakePlan};
 pub use start::Start;

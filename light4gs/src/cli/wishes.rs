@@ -10,7 +10,7 @@ use light4gs_train::config::{Config, Overrides};
 use light4gs_train::dataset::load_options;
 use light4gs_train::error::TrainError;
 use light4gs_train::pace::Pace;
-use light4gs_train::take::TakePlan;
+use light4gs_train::take::{SEGMENT_SHARE, TakePlan};
 
 use super::output::tell;
 
@@ -87,10 +87,11 @@ impl Wishes {
         let config = Config::load(preset, overrides)?;
         let by_hand = Overrides::parse(overrides)?;
         let config = self.sized(config, preset, &by_hand, scene, automatic)?;
-        let of_segment =
-            |bytes: usize| (bytes as f64 * (1.0 - plan.base_share()) / plan.segments.len() as f64) as usize;
-        // The weight of a byte is that for a segment's share, and the target that of the whole.
-        let part = Self { target_bytes: self.target_bytes.map(of_segment), ..*self };
+        // The configuration is that of a clip, of which a segment has a share of the Gaussians, and so of the bytes. The target is
+        // that of the whole.
+        let segments = plan.segments.len() as f64 * SEGMENT_SHARE;
+        let of_clip = |bytes: usize| (bytes as f64 * (1.0 - plan.base_share()) / segments) as usize;
+        let part = Self { target_bytes: self.target_bytes.map(of_clip), ..*self };
         let mut config = part.targeted(config, &by_hand)?;
         if let Some(bytes) = self.target_bytes
             && !by_hand.has("compression.target_bytes")
