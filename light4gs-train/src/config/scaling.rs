@@ -200,7 +200,7 @@ mod tests {
             (config.train.prune.fraction, config.compression.rate.attribute_lambda, most)
         };
         let most = config.train.densify.strategies.adaptive.max_gaussians;
-        // Two passes of pruning leave 5600 Gaussians.
+        // Two passes of pruning leave (64 000 - 8000) / 8.3 Gaussians.
         assert_eq!(at(64_000), (0.3, 0.03, 13_769));
         let (fraction, lambda, fewer) = at(40_000);
         assert!(fraction > 0.3 && lambda > 0.06 && fewer < 13_769, "{fraction}, {lambda}, {fewer}");
