@@ -34,6 +34,10 @@ fn main(
     let channel = i / area;
     let row = i % area / parameters.small_width;
     let column = i % parameters.small_width;
+    if (!has_output(parameters, row, column)) {
+        small[i] = 0.0;
+        return;
+    }
     let kernel = parameters.kernel;
     let before = kernel / 2u;
     let inputs = inputs_of_group(parameters);

@@ -56,7 +56,8 @@ fn main(
                 let strided_column = column + before - right;
                 let source_column = strided_column / parameters.stride;
                 let meets = strided_column % parameters.stride == 0u && source_column < parameters.small_width;
-                if (meets && uses_tap(parameters, down, right)) {
+                let used = uses_tap(parameters, down, right) && has_output(parameters, source_row, source_column);
+                if (meets && used) {
                     sum += weight[kernel_at + down * kernel + right] * source_value(source + source_column);
                 }
             }

@@ -25,9 +25,14 @@ fn large_value(i: u32) -> f32 {
     return large[i];
 }
 
-fn small_value(i: u32) -> f32 {
+fn small_value(channel: u32, place: u32) -> f32 {
+    let width = parameters.small_width;
+    let i = channel * parameters.small_height * width + place;
     if (is_transposed()) {
         return small[i];
+    }
+    if (!has_output(parameters, place / width, place % width)) {
+        return 0.0;
     }
     return leaky(small[i], outputs[i], parameters.slope);
 }
@@ -55,7 +60,7 @@ fn main(
             }
         } else {
             for (var i = lane; i < small_area; i += WORKGROUP) {
-                sum += small_value(channel * small_area + i);
+                sum += small_value(channel, i);
             }
         }
         let total = workgroup_sum(sum, lane);
@@ -79,7 +84,7 @@ fn main(
                 let column = i % parameters.small_width * parameters.stride + right - before;
                 if (row < parameters.large_height && column < parameters.large_width) {
                     let met = input * large_area + row * parameters.large_width + column;
-                    sum += small_value(output * small_area + i) * large_value(met);
+                    sum += small_value(output, i) * large_value(met);
                 }
             }
         }

@@ -39,7 +39,7 @@ impl CheckerboardConfig {
 /// The context of non-anchors from the anchors around them.
 #[derive(Module, Debug)]
 pub struct Checkerboard {
-    /// 5×5 `[M, H, W]` to `[2 M, H, W]`; only taps with row + column odd, which lead from a non-anchor to anchors.
+    /// 5×5 `[M, H, W]` to `[2 M, H, W]`, 0 at the anchors; only taps with row + column odd, which lead from a non-anchor to anchors.
     pub conv: PlaneConv,
 }
 
@@ -65,21 +65,13 @@ impl Checkerboard {
     /// assert_eq!(context.dims(), [8, 8, 8]);
     /// ```
     pub fn context(&self, plane: Tensor<3>) -> Tensor<3> {
-        let [_, height, width] = plane.dims();
-        let others = parity_mask([height, width], 0, &plane.device());
         // From one of the others the taps lead to anchors only, so the plane needs no mask.
-        self.conv.forward(plane) * others
+        self.conv.forward(plane)
     }
 }
 
 /// `[1, H, W]`: 1 at the anchors, where row + column is odd, else 0.
-pub fn anchor_mask(size: [usize; 2], device: &Device) -> Tensor<3> {
-    parity_mask(size, 1, device)
-}
-
-/// `[1, H, W]`: 1 where row + column is odd (`parity` 1) or even (0), else 0.
-fn parity_mask([height, width]: [usize; 2], parity: usize, device: &Device) -> Tensor<3> {
-    let is_in = |i: usize| u8::from((i / width + i % width) % 2 == parity);
-    let mask: Vec<f32> = (0..height * width).map(|i| is_in(i).into()).collect();
+pub fn anchor_mask([height, width]: [usize; 2], device: &Device) -> Tensor<3> {
+    let mask: Vec<f32> = (0..height * width).map(|i| ((i / width + i % width) % 2) as f32).collect();
     Tensor::<1>::from_floats(mask.as_slice(), device).reshape([1, height, width])
 }

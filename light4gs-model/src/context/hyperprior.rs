@@ -9,7 +9,6 @@ use light4gs_codec::{Network, PlaneSource};
 use super::prior::{CenteredPlanes, DescribedCondition, DescribedPrior, Passes, Prior, PriorPart};
 use crate::entropy::bottleneck::{EntropyBottleneck, EntropyBottleneckConfig, Latent};
 use crate::entropy::convolution::{LEAKY_SLOPE, PlaneConv, PlaneConvConfig, PlaneDeconv, PlaneDeconvConfig};
-use crate::entropy::gaussian_conditional::bits;
 
 /// Configuration of a [`Hyperprior`].
 #[derive(Config, Debug)]
@@ -91,12 +90,13 @@ impl Hyperprior {
 impl PriorPart for Hyperprior {
     /// Applies to every plane.
     fn prior(&self, planes: &CenteredPlanes, plane: usize, latent: Latent) -> Option<Prior> {
-        let (received, likelihood) = self.bottleneck.forward(self.analyze(planes.in_steps(plane)), latent);
+        let received = self.bottleneck.received(self.analyze(planes.in_steps(plane)), latent);
+        let latent_bits = Some(self.bottleneck.bits(received.clone()).sum());
         Some(Prior {
             parameters: Some(self.synthesize(received)),
             context: None,
             passes: Passes::AnchorsFirst,
-            latent_bits: Some(bits(likelihood).sum()),
+            latent_bits,
         })
     }
 

@@ -1,5 +1,7 @@
 //! The interface of a part of the context model: the planes that it may read, and the prior that it computes.
 
+use std::cell::OnceCell;
+
 use burn::tensor::Tensor;
 use light4gs_codec::plane_layout::{PlaneAxes, PlaneLayout};
 use light4gs_codec::{Network, PlaneSource};
@@ -17,6 +19,14 @@ pub struct CenteredPlanes {
     planes: PlaneTensors,
     centers: Vec<f64>,
     steps: PlaneSteps,
+    computed: Vec<Computed>,
+}
+
+/// What has been asked for of a plane: its operations, which have gradients, are recorded once.
+#[derive(Clone, Debug, Default)]
+struct Computed {
+    centered: OnceCell<Tensor<3>>,
+    in_steps: OnceCell<Tensor<3>>,
 }
 
 impl CenteredPlanes {
@@ -26,20 +36,25 @@ impl CenteredPlanes {
     /// If there is not one center for each plane.
     pub fn new(planes: PlaneTensors, centers: Vec<f64>, steps: PlaneSteps) -> Self {
         assert_eq!(centers.len(), planes.len(), "a center for each plane");
-        Self { planes, centers, steps }
+        let computed = vec![Computed::default(); planes.len()];
+        Self { planes, centers, steps, computed }
     }
 
     /// A plane with its center subtracted, `[M, H, W]`, original units.
     pub fn plane(&self, plane: usize) -> Tensor<3> {
-        let values = self.planes[plane].clone();
-        // Subtracting nothing would be a launch on a GPU.
-        if self.centers[plane] == 0.0 { values } else { values - self.centers[plane] }
+        let centered = self.computed[plane].centered.get_or_init(|| {
+            let values = self.planes[plane].clone();
+            // Subtracting nothing would be a launch on a GPU.
+            if self.centers[plane] == 0.0 { values } else { values - self.centers[plane] }
+        });
+        centered.clone()
     }
 
     /// Replaces a plane by values with the center subtracted.
     pub(super) fn set(&mut self, plane: usize, centered: Tensor<3>) {
         self.planes.set(plane, centered);
         self.centers[plane] = 0.0;
+        self.computed[plane] = Computed::default();
     }
 
     /// The planes' steps.
@@ -49,10 +64,13 @@ impl CenteredPlanes {
 
     /// A plane in units of its step, `[M, H, W]`.
     pub fn in_steps(&self, plane: usize) -> Tensor<3> {
-        let values = self.plane(plane);
-        let shape = values.dims();
-        // As a vector: the sum for the gradient of the step then has one axis.
-        (values.reshape([-1]) / self.steps.of(plane)).reshape(shape)
+        let in_steps = self.computed[plane].in_steps.get_or_init(|| {
+            let values = self.plane(plane);
+            let shape = values.dims();
+            // As a vector: the sum for the gradient of the step then has one axis.
+            (values.reshape([-1]) / self.steps.of(plane)).reshape(shape)
+        });
+        in_steps.clone()
     }
 
     /// The layout of the planes.

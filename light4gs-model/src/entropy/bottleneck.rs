@@ -7,7 +7,7 @@ use burn::module::{Module, Param};
 use burn::tensor::{Device, Distribution, Tensor, s};
 
 use super::factorized_density::{FactorizedDensity, FactorizedDensityConfig};
-use super::gaussian_conditional::LIKELIHOOD_BOUND;
+use super::gaussian_conditional::{LIKELIHOOD_BOUND, bits};
 use crate::ops::lower_bound::lower_bound;
 
 /// Probability outside of the outermost quantiles, both sides together.
@@ -69,23 +69,38 @@ pub struct EntropyBottleneck {
 impl EntropyBottleneck {
     /// The decoded `latent [C, H, W]`, or its approximation, and the probability of each element; both `[C, H, W]`.
     pub fn forward(&self, latent: Tensor<3>, kind: Latent) -> (Tensor<3>, Tensor<3>) {
-        let received = match kind {
+        let received = self.received(latent, kind);
+        let likelihood = self.likelihood(received.clone());
+        (received, likelihood)
+    }
+
+    /// The decoded `latent [C, H, W]`, or its approximation.
+    pub fn received(&self, latent: Tensor<3>, kind: Latent) -> Tensor<3> {
+        match kind {
             Latent::Exact => latent,
             Latent::Noise => {
                 let noise = Tensor::random(latent.dims(), Distribution::Uniform(-0.5, 0.5), &latent.device());
                 latent + noise
             }
             Latent::Rounded => self.symbols(latent) + self.medians(),
-        };
-        let likelihood = self.likelihood(received.clone());
-        (received, likelihood)
+        }
     }
 
-    /// Probability of the unit interval around each element of `[C, H, W]`.
+    /// Probability of the unit interval around each element of `[C, H, W]`, at least [`LIKELIHOOD_BOUND`].
     pub fn likelihood(&self, latent: Tensor<3>) -> Tensor<3> {
+        lower_bound(self.mass(latent), LIKELIHOOD_BOUND)
+    }
+
+    /// Bits of the symbol of each element of `[C, H, W]`: those of [`Self::likelihood`], in one pass.
+    pub fn bits(&self, latent: Tensor<3>) -> Tensor<3> {
+        bits(self.mass(latent))
+    }
+
+    /// [`Self::likelihood`] without its bound.
+    fn mass(&self, latent: Tensor<3>) -> Tensor<3> {
         let [channels, height, width] = latent.dims();
-        let likelihood = self.density.interval_likelihood(latent.reshape([channels, height * width]), 1.0);
-        lower_bound(likelihood, LIKELIHOOD_BOUND).reshape([channels, height, width])
+        let mass = self.density.interval_likelihood(latent.reshape([channels, height * width]), 1.0);
+        mass.reshape([channels, height, width])
     }
 
     /// Integers `[C, H, W]`: the distance from the channel's median, rounded.

@@ -27,8 +27,8 @@ pub struct PlaneConvConfig {
     /// Groups, each of which reads its own share of the inputs.
     #[config(default = 1)]
     pub groups: usize,
-    /// Whether only taps with row + column odd are used: those that lead from a non-anchor of the checkerboard to
-    /// anchors.
+    /// Whether only taps with row + column odd are used, those that lead from a non-anchor of the checkerboard to
+    /// anchors, and the output is 0 at the anchors.
     #[config(default = false)]
     pub checkerboard: bool,
 }

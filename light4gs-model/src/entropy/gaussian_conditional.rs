@@ -5,6 +5,7 @@
 use burn::tensor::Tensor;
 
 use crate::ops::normal_likelihood::{NormalBounds, normal_bits, normal_likelihood};
+use crate::ops::symbol_bits::{BelowBound, symbol_bits};
 
 /// Standard deviations below this are raised to it.
 pub const SCALE_BOUND: f32 = 0.11;
@@ -67,7 +68,8 @@ pub fn gaussian_bits<const D: usize>(values: Tensor<D>, parameters: NormalParame
     normal_bits(values, parameters.0, BOUNDS)
 }
 
-/// Bits of a symbol of this likelihood, elementwise.
+/// Bits of a symbol of this likelihood, elementwise. Likelihoods below [`LIKELIHOOD_BOUND`] are raised to it, with the gradient of
+/// [`lower_bound`](crate::ops::lower_bound::lower_bound).
 pub fn bits<const D: usize>(likelihood: Tensor<D>) -> Tensor<D> {
-    likelihood.log() * -std::f64::consts::LOG2_E
+    symbol_bits(likelihood, LIKELIHOOD_BOUND, BelowBound::Rises)
 }

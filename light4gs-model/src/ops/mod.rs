@@ -42,6 +42,7 @@ pub mod significance;
 pub mod skinning;
 pub mod splat;
 pub mod sums;
+pub mod symbol_bits;
 pub mod tensor_list;
 pub mod time_means;
 pub mod uniform_noise;
@@ -86,6 +87,7 @@ pub const ON_GPU: &[GpuOperation] = &[
     skinning::gpu::OPERATION,
     splat::gpu::OPERATION,
     sums::gpu::OPERATION,
+    symbol_bits::gpu::OPERATION,
     time_means::gpu::OPERATION,
     uniform_noise::gpu::OPERATION,
 ];

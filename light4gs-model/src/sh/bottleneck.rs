@@ -8,7 +8,8 @@ use burn::tensor::{Device, Tensor};
 
 use super::entropy::{SH_CHANNELS, ShEntropy, ShKnown, ShTables, channels_first, channels_last};
 use crate::entropy::factorized_density::{FactorizedDensity, FactorizedDensityConfig};
-use crate::entropy::gaussian_conditional::{LIKELIHOOD_BOUND, bits};
+use crate::entropy::gaussian_conditional::LIKELIHOOD_BOUND;
+use crate::ops::symbol_bits::{BelowBound, symbol_bits};
 
 /// Configuration of a [`ShBottleneck`].
 #[derive(Config, Debug)]
@@ -43,8 +44,12 @@ pub struct ShBottleneck {
 impl ShBottleneck {
     /// Probability of each of `values [N, 15, 3]`, at least [`LIKELIHOOD_BOUND`]; no gradient comes from below that.
     pub fn likelihood(&self, values: Tensor<3>) -> Tensor<3> {
-        let likelihood = self.density.interval_likelihood(channels_first(values), self.step);
-        channels_last(likelihood.clamp_min(LIKELIHOOD_BOUND))
+        channels_last(self.mass(values).clamp_min(LIKELIHOOD_BOUND))
+    }
+
+    /// Of each channel, without a bound.
+    fn mass(&self, values: Tensor<3>) -> Tensor<2> {
+        self.density.interval_likelihood(channels_first(values), self.step)
     }
 }
 
@@ -54,7 +59,7 @@ impl ShEntropy for ShBottleneck {
     }
 
     fn bits(&self, values: Tensor<3>, _: &ShKnown) -> Tensor<3> {
-        bits(self.likelihood(values))
+        channels_last(symbol_bits(self.mass(values), LIKELIHOOD_BOUND, BelowBound::Stays))
     }
 
     fn tables(&self) -> Option<&dyn ShTables> {

@@ -49,9 +49,13 @@ pub struct ShMixture {
 impl ShMixture {
     /// Probability of each of `values [N, 15, 3]`, at least [`LIKELIHOOD_BOUND`].
     pub fn likelihood(&self, values: Tensor<3>) -> Tensor<3> {
+        channels_last(lower_bound(self.mass(values), LIKELIHOOD_BOUND))
+    }
+
+    /// Of each channel, without a bound.
+    fn mass(&self, values: Tensor<3>) -> Tensor<2> {
         let widths = Tensor::full([SH_CHANNELS, 1], self.step, &values.device());
-        let likelihood = self.mixture.interval_likelihood(channels_first(values), widths);
-        channels_last(lower_bound(likelihood, LIKELIHOOD_BOUND))
+        self.mixture.interval_likelihood(channels_first(values), widths)
     }
 }
 
@@ -61,7 +65,7 @@ impl ShEntropy for ShMixture {
     }
 
     fn bits(&self, values: Tensor<3>, _: &ShKnown) -> Tensor<3> {
-        bits(self.likelihood(values))
+        channels_last(bits(self.mass(values)))
     }
 
     fn tables(&self) -> Option<&dyn ShTables> {

@@ -5,6 +5,7 @@ use burn::tensor::{Device, Tensor, Transaction};
 use light4gs_model::ops::activation::{bounded_exponential, sigmoid};
 use light4gs_model::ops::lower_bound::lower_bound;
 use light4gs_model::ops::normal_likelihood::{NormalBounds, normal_likelihood};
+use light4gs_model::ops::symbol_bits::{BelowBound, symbol_bits};
 use light4gs_model::ops::uniform_noise::{NoiseDraw, add_uniform_noise};
 use light4gs_model::{GpuError, HexPlaneConfig, PixelContribution, PlaneTensors, Significance, Splatter};
 use light4gs_tests::odd_scenes::dots;
@@ -34,9 +35,11 @@ fn values_and_gradients_are_those_of_the_cpu() {
     type Function = fn(Tensor<1>) -> Tensor<1>;
     // Of values and slopes. Slopes of a likelihood and of the logistic function have a difference, whose rounding counts; that of
     // the exponential is ten times its value.
-    let functions: [(&str, Function, [f32; 2]); 4] = [
+    let functions: [(&str, Function, [f32; 2]); 6] = [
         ("normal likelihood", around_zero, [f32::MIN_POSITIVE, f32::EPSILON]),
         ("lower bound", |x| lower_bound(x, 0.11), [0.0; 2]),
+        ("symbol bits", |x| symbol_bits(x, 0.11, BelowBound::Rises), [1e-6, 0.0]),
+        ("symbol bits of what stays", |x| symbol_bits(x, 0.11, BelowBound::Stays), [1e-6, 0.0]),
         ("sigmoid", sigmoid, [0.0, f32::EPSILON]),
         ("bounded exponential", |x| bounded_exponential(x * 10.0), [f32::MIN_POSITIVE, 10.0 * f32::MIN_POSITIVE]),
     ];

@@ -117,6 +117,13 @@ impl Sizes {
     }
 }
 
+/// Zeros where row + column is odd.
+fn clear_anchors(plane: &mut [f32], width: usize) {
+    for (row, values) in plane.chunks_exact_mut(width.max(1)).enumerate() {
+        values.iter_mut().skip(1 - row % 2).step_by(2).for_each(|value| *value = 0.0);
+    }
+}
+
 fn forward<B: HostBackend>(tensors: ConvolutionTensors<B>, convolution: PlaneConvolution) -> FloatTensor<B> {
     let sizes = Sizes::of::<B>(&tensors.plane, &tensors.weight, convolution);
     let ConvolutionTensors { plane, weight, bias } = tensors;
@@ -131,9 +138,12 @@ fn forward<B: HostBackend>(tensors: ConvolutionTensors<B>, convolution: PlaneCon
     let mut output = B::to_host(B::float_reshape(output, Shape::from([channels, height, width])));
     let planes = output.as_mut_slice().par_chunks_mut((height * width).max(1));
     planes.zip(bias.as_slice()).for_each(|(plane, bias)| {
-        for value in plane {
+        for value in &mut *plane {
             let sum = *value + bias;
             *value = if sum > 0.0 { sum } else { convolution.slope * sum };
+        }
+        if convolution.checkerboard {
+            clear_anchors(plane, width);
         }
     });
     B::from_host(output)
@@ -144,6 +154,9 @@ fn backward<B: HostBackend>(saved: Convolved<B>, gradient: FloatTensor<B>) -> Co
     let sizes = Sizes::of::<B>(&plane, &weight, convolution);
     let [channels, height, width] = sizes.output(convolution.transposed);
     let mut gradient = B::to_host(gradient);
+    if convolution.checkerboard {
+        gradient.as_mut_slice().par_chunks_mut((height * width).max(1)).for_each(|plane| clear_anchors(plane, width));
+    }
     if convolution.slope != 1.0 {
         // The output has the sign of what went into the leaky ReLU.
         let output = B::to_host(output);

@@ -33,7 +33,8 @@ pub struct PlaneConvolution {
     pub stride: usize,
     /// Groups of channels, each of which reads its own share of the inputs; 1 if transposed.
     pub groups: usize,
-    /// Whether only taps with row + column odd are used; the others have no gradient.
+    /// Whether only taps with row + column odd are used, and only places with row + column even have an output: the others are 0,
+    /// and the other taps have no gradient. The stride must be 1, and the convolution not transposed.
     pub checkerboard: bool,
     /// The transposed convolution: `stride` times as many rows and columns.
     pub transposed: bool,
@@ -170,13 +171,14 @@ impl<B: PlaneConvolutionOps + PlaneConvolutionKernels, C: CheckpointStrategy> Pl
 /// # Panics
 /// If the shapes do not belong together, the kernel is even, or the slope is not positive.
 pub fn convolve(plane: Tensor<3>, weight: Tensor<4>, bias: Tensor<1>, convolution: PlaneConvolution) -> Tensor<3> {
-    let PlaneConvolution { stride, groups, transposed, slope, .. } = convolution;
+    let PlaneConvolution { stride, groups, transposed, slope, checkerboard } = convolution;
     let (channels, [first, second, rows, columns]) = (plane.dims()[0], weight.dims());
     let (inputs, outputs) = if transposed { (first, second) } else { (second * groups, first) };
     assert_eq!(channels, inputs, "the layer takes {inputs} channels, not {channels}");
     assert_eq!(bias.dims(), [outputs], "bias must have the {outputs} channels of the output");
     assert!(rows == columns && rows % 2 == 1, "the kernel's side must be odd, not {rows}×{columns}");
     assert!(stride > 0 && slope > 0.0, "stride and slope must be positive, not {stride} and {slope}");
+    assert!(!checkerboard || (stride == 1 && !transposed), "a checkerboard with stride {stride}, or transposed");
     assert!(outputs.is_multiple_of(groups) && (groups == 1 || !transposed), "{groups} groups of {outputs} outputs");
     Tensor::from_dispatch(Dispatch::plane_convolution(
         ConvolutionTensors { plane: plane.into_dispatch(), weight: weight.into_dispatch(), bias: bias.into_dispatch() },
