@@ -4,7 +4,7 @@ struct Parameters {
     large_channels: u32,
     large_height: u32,
     large_width: u32,
-    // Bit 0: a checkerboard. Bit 1: forward. Bit 2: transposed.
+    // Bit 0: only taps with row + column odd. Bit 1: forward. Bit 2: transposed. Bit 3: 0 where row + column of the smaller plane is odd.
     flags: u32,
     small_channels: u32,
     small_height: u32,
@@ -18,18 +18,12 @@ struct Parameters {
     unused: u32,
 }
 
-fn is_checkerboard(parameters: Parameters) -> bool {
-    return (parameters.flags & 1u) != 0u;
-}
-
-// A checkerboard's taps have row + column odd.
 fn uses_tap(parameters: Parameters, row: u32, column: u32) -> bool {
-    return !is_checkerboard(parameters) || ((row + column) & 1u) == 1u;
+    return (parameters.flags & 1u) == 0u || ((row + column) & 1u) == 1u;
 }
 
-// A checkerboard's places with an output have row + column even; the others are 0.
 fn has_output(parameters: Parameters, row: u32, column: u32) -> bool {
-    return !is_checkerboard(parameters) || ((row + column) & 1u) == 0u;
+    return (parameters.flags & 8u) == 0u || ((row + column) & 1u) == 0u;
 }
 
 fn inputs_of_group(parameters: Parameters) -> u32 {

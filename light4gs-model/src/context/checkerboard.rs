@@ -39,7 +39,7 @@ impl CheckerboardConfig {
 /// The context of non-anchors from the anchors around them.
 #[derive(Module, Debug)]
 pub struct Checkerboard {
-    /// 5×5 `[M, H, W]` to `[2 M, H, W]`, 0 at the anchors; only taps with row + column odd, which lead from a non-anchor to anchors.
+    /// 5×5 `[M, H, W]` to `[2 M, H, W]`; only taps with row + column odd, which lead from a non-anchor to anchors.
     pub conv: PlaneConv,
 }
 
@@ -66,7 +66,7 @@ impl Checkerboard {
     /// ```
     pub fn context(&self, plane: Tensor<3>) -> Tensor<3> {
         // From one of the others the taps lead to anchors only, so the plane needs no mask.
-        self.conv.forward(plane)
+        self.conv.without_anchors(plane)
     }
 }
 

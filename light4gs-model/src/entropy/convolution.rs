@@ -27,8 +27,8 @@ pub struct PlaneConvConfig {
     /// Groups, each of which reads its own share of the inputs.
     #[config(default = 1)]
     pub groups: usize,
-    /// Whether only taps with row + column odd are used, those that lead from a non-anchor of the checkerboard to
-    /// anchors, and the output is 0 at the anchors.
+    /// Whether only taps with row + column odd are used: those that lead from a non-anchor of the checkerboard to
+    /// anchors.
     #[config(default = false)]
     pub checkerboard: bool,
 }
@@ -120,6 +120,12 @@ impl PlaneConv {
         self.convolved(plane, 1.0)
     }
 
+    /// [`Self::forward`] with zeros at the anchors of the checkerboard, where row + column is odd.
+    pub fn without_anchors(&self, plane: Tensor<3>) -> Tensor<3> {
+        let convolution = PlaneConvolution { without_anchors: true, ..self.convolution(1.0) };
+        convolve(plane, self.weight.val(), self.bias.val(), convolution)
+    }
+
     /// [`Self::forward`], through a leaky ReLU with [`LEAKY_SLOPE`].
     pub fn rectified(&self, plane: Tensor<3>) -> Tensor<3> {
         self.convolved(plane, LEAKY_SLOPE)
@@ -142,7 +148,8 @@ impl PlaneConv {
 
     fn convolution(&self, slope: f64) -> PlaneConvolution {
         let Self { stride, groups, checkerboard, .. } = *self;
-        PlaneConvolution { stride, groups, checkerboard, transposed: false, slope: slope as f32 }
+        let slope = slope as f32;
+        PlaneConvolution { stride, groups, checkerboard, without_anchors: false, transposed: false, slope }
     }
 }
 
@@ -196,7 +203,14 @@ impl PlaneDeconv {
     /// `[O, 2 H, 2 W]` from `[I, H, W]`, through a leaky ReLU with [`LEAKY_SLOPE`].
     pub fn rectified(&self, plane: Tensor<3>) -> Tensor<3> {
         let slope = LEAKY_SLOPE as f32;
-        let doubling = PlaneConvolution { stride: 2, groups: 1, checkerboard: false, transposed: true, slope };
+        let doubling = PlaneConvolution {
+            stride: 2,
+            groups: 1,
+            checkerboard: false,
+            without_anchors: false,
+            transposed: true,
+            slope,
+        };
         convolve(plane, self.weight.val(), self.bias.val(), doubling)
     }
 }

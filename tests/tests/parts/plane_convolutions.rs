@@ -5,7 +5,7 @@ use burn::tensor::activation::leaky_relu;
 use burn::tensor::module::{conv_transpose2d, conv2d};
 use burn::tensor::ops::{ConvOptions, ConvTransposeOptions};
 use burn::tensor::{Device, Distribution, Gradients, Tensor};
-use light4gs_model::{LEAKY_SLOPE, PlaneConvConfig, PlaneDeconvConfig, checkerboard_kernel};
+use light4gs_model::{LEAKY_SLOPE, PlaneConvConfig, PlaneDeconvConfig, anchor_mask, checkerboard_kernel};
 use light4gs_tests::golden::{assert_close_relative, devices, values_of};
 
 type Output = (Tensor<3>, [Vec<f32>; 3]);
@@ -84,7 +84,7 @@ fn convolution() {
     }
 }
 
-/// Masked taps are neither used nor have a gradient, whatever their weights are.
+/// Masked taps are neither used nor have a gradient, whatever their weights are; nor have anchors that are left out.
 #[test]
 fn checkerboard_convolution() {
     for (name, device) in devices() {
@@ -95,10 +95,16 @@ fn checkerboard_convolution() {
             conv.weight = Param::from_tensor(Tensor::random([8, 4 / groups, 5, 5], Distribution::Default, &device));
             let plane = random_plane([4, 6, 9], &device);
             let options = ConvOptions::new([1; 2], [2; 2], [1, 1], groups);
-            let weight = conv.weight.val() * checkerboard_kernel(5, &device).unsqueeze::<4>();
-            let burns = conv2d(plane.clone().unsqueeze::<4>(), weight, Some(conv.bias.val()), options);
+            // A tape serves one backward pass.
+            let burns = || -> Tensor<3> {
+                let weight = conv.weight.val() * checkerboard_kernel(5, &device).unsqueeze::<4>();
+                conv2d(plane.clone().unsqueeze::<4>(), weight, Some(conv.bias.val()), options.clone()).squeeze_dim(0)
+            };
             let what = format!("{name} checkerboard, groups {groups}");
-            compare(&what, &plane, &conv.weight, &conv.bias, conv.forward(plane.clone()), burns.squeeze_dim(0));
+            compare(&what, &plane, &conv.weight, &conv.bias, conv.forward(plane.clone()), burns());
+            let others = anchor_mask([6, 9], &device).neg() + 1.0;
+            let what = format!("{what}, without anchors");
+            compare(&what, &plane, &conv.weight, &conv.bias, conv.without_anchors(plane.clone()), burns() * others);
         }
     }
 }

@@ -142,7 +142,7 @@ fn forward<B: HostBackend>(tensors: ConvolutionTensors<B>, convolution: PlaneCon
             let sum = *value + bias;
             *value = if sum > 0.0 { sum } else { convolution.slope * sum };
         }
-        if convolution.checkerboard {
+        if convolution.without_anchors {
             clear_anchors(plane, width);
         }
     });
@@ -154,7 +154,7 @@ fn backward<B: HostBackend>(saved: Convolved<B>, gradient: FloatTensor<B>) -> Co
     let sizes = Sizes::of::<B>(&plane, &weight, convolution);
     let [channels, height, width] = sizes.output(convolution.transposed);
     let mut gradient = B::to_host(gradient);
-    if convolution.checkerboard {
+    if convolution.without_anchors {
         gradient.as_mut_slice().par_chunks_mut((height * width).max(1)).for_each(|plane| clear_anchors(plane, width));
     }
     if convolution.slope != 1.0 {

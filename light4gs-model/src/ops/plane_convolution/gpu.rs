@@ -36,7 +36,10 @@ impl Sizes {
     fn uniform(&self, slope: f32, forward: bool, transposed: bool) -> [u32; 12] {
         let [large, small] = [self.large, self.small].map(|sizes| sizes.map(|size| size as u32));
         let [kernel, stride, groups] = [self.kernel, self.stride, self.groups].map(|number| number as u32);
-        let flags = u32::from(self.checkerboard) | u32::from(forward) << 1 | u32::from(transposed) << 2;
+        let flags = u32::from(self.checkerboard)
+            | u32::from(forward) << 1
+            | u32::from(transposed) << 2
+            | u32::from(self.without_anchors) << 3;
         [large[0], large[1], large[2], flags, small[0], small[1], small[2], slope.to_bits(), kernel, stride, groups, 0]
     }
 
@@ -132,10 +135,17 @@ impl<B: FusionBackend + PlaneConvolutionKernels> PlaneConvolutionKernels for Fus
 /// Strides, groups, a checkerboard kernel, the transposed convolution; with and without the leaky ReLU.
 fn sample(device: &Device) -> Vec<TensorData> {
     let mut numbers = Numbers::new(&device.clone().autodiff());
-    let plain = PlaneConvolution { stride: 1, groups: 1, checkerboard: false, transposed: false, slope: 0.01 };
+    let plain = PlaneConvolution {
+        stride: 1,
+        groups: 1,
+        checkerboard: false,
+        without_anchors: false,
+        transposed: false,
+        slope: 0.01,
+    };
     let cases = [
         ([4, 6, 1], plain),
-        ([6, 4, 5], PlaneConvolution { groups: 2, checkerboard: true, slope: 1.0, ..plain }),
+        ([6, 4, 5], PlaneConvolution { groups: 2, checkerboard: true, without_anchors: true, slope: 1.0, ..plain }),
         ([3, 5, 5], PlaneConvolution { stride: 2, ..plain }),
         ([3, 4, 5], PlaneConvolution { stride: 2, transposed: true, ..plain }),
     ];

@@ -33,9 +33,10 @@ pub struct PlaneConvolution {
     pub stride: usize,
     /// Groups of channels, each of which reads its own share of the inputs; 1 if transposed.
     pub groups: usize,
-    /// Whether only taps with row + column odd are used, and only places with row + column even have an output: the others are 0,
-    /// and the other taps have no gradient. The stride must be 1, and the convolution not transposed.
+    /// Whether only taps with row + column odd are used; the others have no gradient.
     pub checkerboard: bool,
+    /// Whether the output is 0 at the anchors, where row + column is odd; not if transposed.
+    pub without_anchors: bool,
     /// The transposed convolution: `stride` times as many rows and columns.
     pub transposed: bool,
     /// Slope below zero of the leaky ReLU behind it, above 0; 1 for none.
@@ -53,18 +54,19 @@ struct Sizes {
     stride: usize,
     groups: usize,
     checkerboard: bool,
+    without_anchors: bool,
 }
 
 impl Sizes {
     /// Of a convolution with a plane `[channels, height, width]` and weights of this shape.
     fn new([channels, height, width]: [usize; 3], weight: [usize; 4], convolution: PlaneConvolution) -> Self {
-        let PlaneConvolution { stride, groups, checkerboard, transposed, .. } = convolution;
+        let PlaneConvolution { stride, groups, checkerboard, without_anchors, transposed, .. } = convolution;
         let (large, small) = if transposed {
             ([weight[1], height * stride, width * stride], [channels, height, width])
         } else {
             ([channels, height, width], [weight[0], height.div_ceil(stride), width.div_ceil(stride)])
         };
-        Self { large, small, kernel: weight[2], stride, groups, checkerboard }
+        Self { large, small, kernel: weight[2], stride, groups, checkerboard, without_anchors }
     }
 
     fn of<B: Backend>(plane: &FloatTensor<B>, weight: &FloatTensor<B>, convolution: PlaneConvolution) -> Self {
@@ -163,7 +165,7 @@ impl<B: PlaneConvolutionOps + PlaneConvolutionKernels, C: CheckpointStrategy> Pl
 /// let device = Device::flex();
 /// let plane = Tensor::<3>::from_floats([[[1.0, -2.0, 3.0]]], &device);
 /// let weight = Tensor::<4>::ones([1, 1, 3, 3], &device);
-/// let convolution = PlaneConvolution { stride: 1, groups: 1, checkerboard: false, transposed: false, slope: 0.5 };
+/// let convolution = PlaneConvolution { stride: 1, groups: 1, checkerboard: false, without_anchors: false, transposed: false, slope: 0.5 };
 /// let output = convolve(plane, weight, Tensor::from_floats([-1.5], &device), convolution);
 /// assert_eq!(output.into_data().to_vec::<f32>().unwrap(), [-1.25, 0.5, -0.25]);
 /// ```
@@ -171,14 +173,14 @@ impl<B: PlaneConvolutionOps + PlaneConvolutionKernels, C: CheckpointStrategy> Pl
 /// # Panics
 /// If the shapes do not belong together, the kernel is even, or the slope is not positive.
 pub fn convolve(plane: Tensor<3>, weight: Tensor<4>, bias: Tensor<1>, convolution: PlaneConvolution) -> Tensor<3> {
-    let PlaneConvolution { stride, groups, transposed, slope, checkerboard } = convolution;
+    let PlaneConvolution { stride, groups, transposed, slope, without_anchors, .. } = convolution;
     let (channels, [first, second, rows, columns]) = (plane.dims()[0], weight.dims());
     let (inputs, outputs) = if transposed { (first, second) } else { (second * groups, first) };
     assert_eq!(channels, inputs, "the layer takes {inputs} channels, not {channels}");
     assert_eq!(bias.dims(), [outputs], "bias must have the {outputs} channels of the output");
     assert!(rows == columns && rows % 2 == 1, "the kernel's side must be odd, not {rows}×{columns}");
     assert!(stride > 0 && slope > 0.0, "stride and slope must be positive, not {stride} and {slope}");
-    assert!(!checkerboard || (stride == 1 && !transposed), "a checkerboard with stride {stride}, or transposed");
+    assert!(!(without_anchors && transposed), "anchors of a transposed convolution");
     assert!(outputs.is_multiple_of(groups) && (groups == 1 || !transposed), "{groups} groups of {outputs} outputs");
     Tensor::from_dispatch(Dispatch::plane_convolution(
         ConvolutionTensors { plane: plane.into_dispatch(), weight: weight.into_dispatch(), bias: bias.into_dispatch() },
