@@ -347,9 +347,8 @@ export class Player extends EventTarget {
     if (this.#busy || this.#undrawn) return;
     const still = this.#isStill(performance.now());
     if (this.#isShown() && !(still && (this.#shownLevel > 0 || this.#shownTogether))) return;
-    const { level, scale } = this.#draft;
-    // Where there is no time for all pixels, there is none for two pictures.
-    (still ? this.#show() : this.#show(level, level === 0 && scale === 1)).catch(this.#fail);
+    const { level, hasTimeForTwo } = this.#draft;
+    (still ? this.#show() : this.#show(level, hasTimeForTwo)).catch(this.#fail);
   }
 
   /** Whether the graphics card is still at the last image. @param {number} now */

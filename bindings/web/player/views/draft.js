@@ -19,6 +19,8 @@ const PATIENCE = 4000;
 /** Chooses a step from the time that images take. */
 class Steps {
   step = 0;
+  /** Milliseconds that an image took the last time this was judged, the median. */
+  median = Infinity;
   /** @type {number[]} */
   #intervals = [];
   #tried = 0;
@@ -46,6 +48,7 @@ class Steps {
     if (this.#intervals.length < SAMPLES && !hopeless) return 0;
     const sorted = this.#intervals.sort((a, b) => a - b);
     const median = sorted[Math.floor(sorted.length / 2)];
+    this.median = median;
     const before = this.step;
     this.#intervals = [];
     if (median > (this.step < this.lastGood ? SLOW : VERY_SLOW) && this.step < this.last) {
@@ -81,6 +84,11 @@ export class Draft {
   /** The level of detail of moving images, for which both drawing and worker have time. */
   get level() {
     return Math.min(this.levels, Math.max(LADDER[this.#drawing.step][1], this.#worker.step));
+  }
+
+  /** Whether there is time for two pictures of all pixels and all Gaussians in place of one. */
+  get hasTimeForTwo() {
+    return this.scale === 1 && this.level === 0 && 2 * this.#drawing.median < SLOW;
   }
 
   /**
