@@ -304,3 +304,66 @@ fn bits(hidden: &[u32], count: usize) -> Vec<bool> {
     }
     bits
 }
+
+#[cfg(test)]
+mod tests {
+    use light4gs_data::{Camera, Frame, PointCloud, SplitFrames};
+
+    use super::super::plan::SegmentLength;
+    use super::*;
+
+    /// A take of one camera with images of `side` × `side` pixels, and its plan of segments of two seconds.
+    fn take(seconds: usize, side: u32) -> (Scene, TakePlan) {
+        let camera = Camera::look_at([4.0, 0.0, 0.5].into(), [0.0; 3].into(), [0.0, 0.0, 1.0].into(), 0.7, side, side);
+        let count = 30 * seconds;
+        let frame = |k| Frame::without_image(format!("{k}"), camera, k as f32 / (count - 1) as f32);
+        let frames = SplitFrames { train: (0..count).map(frame).collect(), ..SplitFrames::default() };
+        let scene = Scene::new("memory", Path::new("take"), frames, PointCloud::random(60, 0.8, 0), [1.0; 3]).unwrap();
+        let plan = TakePlan::of(&scene, seconds as f64, SegmentLength::Seconds(2.0), &[]).unwrap();
+        (scene, plan)
+    }
+
+    fn folder(root: &Path, seconds: usize, side: u32, config: &Config) -> TakeFolder {
+        let (scene, plan) = take(seconds, side);
+        TakeFolder::create(&root.join("take"), Path::new("take"), &scene, plan, config).unwrap()
+    }
+
+    /// A longer take needs no more memory: the base is trained from images of all of it, and decodes those that have no room again.
+    #[test]
+    fn the_base_keeps_no_more_images_than_a_segment_has() {
+        let config = Config::default();
+        let in_memory = |seconds, side| {
+            let root = tempfile::tempdir().unwrap();
+            folder(root.path(), seconds, side, &config).config_of_base().data.memory_limit_mib
+        };
+        // A segment in the middle has 60 frames and some of its neighbors.
+        let short = in_memory(8, 320);
+        assert!((18..=24).contains(&short), "{short} MiB");
+        assert_eq!(in_memory(60, 320), short);
+        // Never fewer than any training keeps, and never more than the configuration allows.
+        assert_eq!(in_memory(8, 32), LEAST_IN_MEMORY);
+        assert_eq!(in_memory(8, 4000), config.data.memory_limit_mib);
+    }
+
+    #[test]
+    fn what_the_base_leaves_of_a_target_is_shared_alike() {
+        let root = tempfile::tempdir().unwrap();
+        let mut config = Config::default();
+        config.compression.target_bytes = 100_000;
+        let folder = folder(root.path(), 8, 32, &config);
+        let of_base = folder.config_of_base().compression.target_bytes;
+        assert!(of_base > 0 && of_base < config.compression.target_bytes);
+        let segments = &folder.record.plan.segments;
+        assert!(folder.config_of_segment(&segments[0]).is_err(), "there is no base yet");
+        std::fs::create_dir_all(folder.base()).unwrap();
+        std::fs::write(folder.base().join("scene.l4gs"), vec![0; of_base]).unwrap();
+        let each: Vec<usize> =
+            segments.iter().map(|one| folder.config_of_segment(one).unwrap().compression.target_bytes).collect();
+        let sum = of_base + each.iter().sum::<usize>();
+        assert!(each.iter().all(|bytes| *bytes == each[0]) && sum <= 100_000 && sum > 90_000, "{of_base} and {each:?}");
+        // A base that is too large is an error that names a target for which there would be room.
+        std::fs::write(folder.base().join("scene.l4gs"), vec![0; 100_000]).unwrap();
+        let error = folder.config_of_segment(&segments[0]).unwrap_err().to_string();
+        assert!(error.contains("--target-bytes 100000") && error.contains("at least 2"), "{error}");
+    }
+}
