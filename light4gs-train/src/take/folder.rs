@@ -317,7 +317,8 @@ mod tests {
         let camera = Camera::look_at([4.0, 0.0, 0.5].into(), [0.0; 3].into(), [0.0, 0.0, 1.0].into(), 0.7, side, side);
         let count = 30 * seconds;
         let frame = |k| Frame::without_image(format!("{k}"), camera, k as f32 / (count - 1) as f32);
-        let frames = SplitFrames { train: (0..count).map(frame).collect(), ..SplitFrames::default() };
+        let train: Vec<Frame> = (0..count).map(frame).collect();
+        let frames = SplitFrames { test: train[..1].to_vec(), train, ..SplitFrames::default() };
         let scene = Scene::new("memory", Path::new("take"), frames, PointCloud::random(60, 0.8, 0), [1.0; 3]).unwrap();
         let plan = TakePlan::of(&scene, seconds as f64, SegmentLength::Seconds(2.0), &[]).unwrap();
         (scene, plan)
