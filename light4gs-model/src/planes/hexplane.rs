@@ -16,7 +16,8 @@ keys! {
     pub struct HexPlaneConfig {
         /// Number of channels of each plane: a plane holds this many numbers at each of its points.
         channels: usize = 32; Whole { least: 1, most: 1024 }, "paper: 32 for D-NeRF, 16 for real scenes";
-        /// Resolution of the planes along x, y, z, t, each a multiple of 4, before it is multiplied by `multipliers`.
+        /// Resolution of the planes along x, y, z and t, before `multipliers` are applied. Each number is a multiple of
+        /// 4.
         resolution: [usize; 4] = [64, 64, 64, 24];
             List { element: &Whole { least: 4, most: MOST_PLANE_RESOLUTION as u64 }, length: Some(4) },
             "paper; its 25 time steps are no multiple of 4";

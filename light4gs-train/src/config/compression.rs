@@ -125,7 +125,8 @@ keys! {
         learning_rate_init: f64 = 5e-3; RATE, "ours";
         /// Learning rate of the context model at the end of the fine stage.
         learning_rate_final: f64 = 5e-4; RATE, "ours";
-        /// Training steps that fit the entropy models to a scene that was trained without them.
+        /// If a scene was trained without entropy models, the encoder fits these models to the finished scene, in this
+        /// number of training steps.
         fit_iterations: usize = 1500; Whole { least: 1, most: 1_000_000 }, "ours";
     }
 }

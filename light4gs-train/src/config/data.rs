@@ -72,8 +72,8 @@ keys! {
         frames: Option<usize> = None;
             WholeOrNone { least: 1, most: 1_000_000 },
             "reference, Neu3D: 300";
-        /// Frames per second of the capture, from which its length in seconds follows. A number below 0.001 means the
-        /// frame rate that the capture's files state, if they state one.
+        /// Frames per second of the capture. The length of the capture in seconds follows from this frame rate. If the
+        /// number is below 0.001, the frame rate is the one that the capture's files state, if they state one.
         frames_a_second: f64 = 0.0; Number { least: 0.0, most: 1e5 }, "ours";
         /// First and last time of the images that are used, as shares of the capture's length. In the run of a take's
         /// segment, these are the times on which the segment is trained.

@@ -115,8 +115,9 @@ impl CoarseToFineConfig {
 }
 
 keys! {
-    /// Adam's learning rates. A rate with an `init` and a `final` value decays exponentially from one to the other. The
-    /// rates of positions, deformation and feature planes are multiplied by the scene's extent.
+    /// Adam's learning rates. A learning rate with an `init` and a `final` value decays exponentially from the first
+    /// value to the second. The learning rates of positions, deformation and feature planes are multiplied by the
+    /// scene's extent.
     pub struct LearningRates {
         /// Learning rate of the deformation network at the first training step.
         deformation_init: f64 = 1.6e-4; RATE, "reference";
@@ -138,10 +139,12 @@ keys! {
         /// Length of the decay in iterations. 0 means the length of the stage.
         #[serde(with = "optional")]
         schedule_steps: Option<usize> = None; ITERATION, "ours; reference: 20000";
-        /// Share of the fine stage, at its end, in which all learning rates of this table fall once more. This cooldown
-        /// averages away the noise of the training steps, after motion has been found. 0 means no cooldown.
+        /// Length of the cooldown at the end of the fine stage, as a share of this stage. In the cooldown, all learning
+        /// rates of this table fall faster than by their usual decay. The cooldown averages away the noise of the
+        /// training steps, after motion has been found. 0 means no cooldown.
         cooldown: f64 = 0.0; SHARE, "ours; the last phase of warmup-stable-decay (Hu et al. 2024)";
-        /// Factor by which the learning rates have fallen at the end of the cooldown.
+        /// Factor by which the cooldown multiplies the learning rates; it falls from 1 to this value during the
+        /// cooldown.
         cooldown_factor: f64 = 0.1; Number { least: 1e-6, most: 1.0 }, "ours";
     }
 }

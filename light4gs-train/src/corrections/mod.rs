@@ -63,11 +63,11 @@ keys! {
 }
 
 keys! {
-    /// How corrections of exposures, poses and times are learned. The keys that end in `_init` and `_final` are Adam's
-    /// learning rates at the beginning and at the end of a run that trains on each frame, or on each camera's frames, a
-    /// hundred times. In a run that trains on them less often, the learning rates are larger in proportion, up to three
-    /// times as large. In a run that trains on them more often, the learning rates are smaller in proportion, down to a
-    /// fifth.
+    /// How corrections of exposures, poses and times are learned. A correction belongs to a frame or to a camera, and
+    /// is learned from the views of this frame or camera that training draws. The keys that end in `_init` and `_final`
+    /// are Adam's learning rates at the beginning and at the end of a run that draws a hundred such views for each
+    /// correction. If a run draws fewer, the learning rates are larger in proportion, up to three times as large. If a
+    /// run draws more, the learning rates are smaller in proportion, down to a fifth.
     pub struct CorrectionRates {
         /// Poses and times are corrected from this iteration on, since in earlier iterations there is no scene to
         /// compare the frames with. Iterations are counted over both stages.
