@@ -93,7 +93,7 @@ pub(super) struct Export {
     /// rate, or 30 if it is not known.
     #[arg(long, allow_negative_numbers = true)]
     fps: Option<f32>,
-    /// For a .glb of a scene whose z axis points up, as in Blender: the scene is turned, since glTF's y axis points up.
+    /// In a .glb, turn a scene whose z axis points up, as in Blender, so that its y axis points up, as in glTF.
     #[arg(long)]
     z_up: bool,
     /// Back end: auto (a graphics card if there is one), flex or ndarray (both on the processor), wgpu, or wgpu with an adapter

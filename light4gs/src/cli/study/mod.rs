@@ -73,8 +73,8 @@ pub(super) struct Study {
     /// finished run with the same training. This option may be given more than once.
     #[arg(long, value_name = "STUDY")]
     reuse: Vec<PathBuf>,
-    /// Train only the runs that have these parts, such as 400,small,seed-0, in their names SCENE/VALUE+VALUE/seed-K. If
-    /// several scenes are given, a run needs only one of them; the same holds for several values of one axis and for
+    /// Train only the runs whose names SCENE/VALUE+VALUE/seed-K have all of these parts, such as 400,small,seed-0. If
+    /// several parts are scenes, one of these scenes is enough; the same holds for several values of one axis and for
     /// several seeds. All other runs stay missing.
     #[arg(long, value_delimiter = ',', value_name = "PART")]
     only: Vec<String>,
