@@ -24,6 +24,14 @@ test("slow images get fewer pixels, then fewer Gaussians", () => {
   assert.equal(after(40).hasTimeForTwo, false);
 });
 
+test("what small images took says nothing about large ones", () => {
+  const draft = after(40);
+  for (let k = 0; k < 4; k++) draft.measureDrawing(5, 60000 + 100 * k);
+  assert.deepEqual([draft.scale, draft.hasTimeForTwo], [1, false]);
+  for (let k = 0; k < 4; k++) draft.measureDrawing(5, 61000 + 100 * k);
+  assert.equal(draft.hasTimeForTwo, true);
+});
+
 test("where the worker is slow, there is no time for two pictures either", () => {
   const draft = after(5);
   for (let k = 0; k < 4; k++) draft.measureWorker(40, 1000 + 100 * k);

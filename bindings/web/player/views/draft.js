@@ -60,6 +60,8 @@ class Steps {
       this.step--;
       this.#tried = now + 5 * PATIENCE;
     }
+    // Images of another step take another time.
+    if (this.step !== before) this.median = Infinity;
     return this.step - before;
   }
 }
